@@ -1,0 +1,1 @@
+//! The camsim command line.

@@ -1,0 +1,40 @@
+//! What one rendered frame gives, as plain data between renderer and writers.
+
+use glam::{DQuat, DVec3};
+
+/// Time, pose and velocity of one line of the readout (a row, or a column for sideways readout) at its mid-exposure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowRecord {
+    /// Line number from 0.
+    pub row: u32,
+    /// Mid-exposure, nanoseconds on the log's clock.
+    pub t_mid_ns: i64,
+    /// Optical centre in NED.
+    pub position_ned_m: DVec3,
+    /// Takes optical camera coordinates to NED.
+    pub ned_from_camera: DQuat,
+    /// Velocity of the optical centre in NED.
+    pub velocity_ned_m_s: DVec3,
+}
+
+/// Floats per pixel of [`RenderedFrame::coords`].
+pub const COORDS_CHANNELS: usize = 8;
+
+/// One finished frame. Images are row-major from the top-left pixel.
+#[derive(Clone, Debug, Default)]
+pub struct RenderedFrame {
+    /// Frame number of the sequence.
+    pub index: u64,
+    /// Stamp t_i, nanoseconds on the log's clock.
+    pub stamp_ns: i64,
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Linear R G B A, four floats a pixel; A is 1 where a ray exists, else 0.
+    pub color_rgba: Vec<f32>,
+    /// Planar depth in the row's own camera, metres, 0 = nothing there.
+    pub depth_m: Option<Vec<f32>>,
+    /// Per pixel: ideal ray u, v; source x, y in the ideal frame (pixels); Delta t (s); the ray's point n, e, d (m).
+    pub coords: Option<Vec<[f32; COORDS_CHANNELS]>>,
+    /// One record a line of the readout.
+    pub rows: Vec<RowRecord>,
+}

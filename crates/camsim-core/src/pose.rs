@@ -1,0 +1,38 @@
+//! Poses and motion states. World is local NED in metres (f64), body is FRD, camera is optical (x right, y down, z forward).
+
+use glam::{DMat3, DQuat, DVec3};
+
+/// Full motion state of the platform at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyState {
+    /// Position in NED, metres.
+    pub position_ned_m: DVec3,
+    /// Velocity in NED, m/s.
+    pub velocity_ned_m_s: DVec3,
+    /// Acceleration in NED, m/s^2.
+    pub acceleration_ned_m_s2: DVec3,
+    /// Rotation that takes body (FRD) coordinates to NED.
+    pub ned_from_body: DQuat,
+    /// Angular rate of the body relative to NED, in body axes, rad/s.
+    pub rate_body_rad_s: DVec3,
+    /// Time derivative of `rate_body_rad_s`, rad/s^2.
+    pub angular_acceleration_body_rad_s2: DVec3,
+}
+
+/// Position and attitude of the camera at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPose {
+    /// Optical centre in NED, metres.
+    pub position_ned_m: DVec3,
+    /// Rotation that takes optical camera coordinates to NED.
+    pub ned_from_camera: DQuat,
+}
+
+impl CameraPose {
+    /// The rigid motion that takes coordinates of `self` to coordinates of `other`: `x_other = R x_self + t`, in f64.
+    pub fn relative_to(&self, other: &Self) -> (DMat3, DVec3) {
+        let other_from_ned = other.ned_from_camera.inverse();
+        let rotation = DMat3::from_quat((other_from_ned * self.ned_from_camera).normalize());
+        (rotation, other_from_ned * (self.position_ned_m - other.position_ned_m))
+    }
+}

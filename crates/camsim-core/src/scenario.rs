@@ -1,0 +1,299 @@
+//! The scenario: one plain struct that TOML, `--set`, the command line and the viewer all edit.
+//!
+//! Every key has a default except `flight.log` and the scene. Angles are degrees only where the key says `_deg`,
+//! lengths are metres, times seconds or `_ms`. Paths are as written in the file until the loader resolves them.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+mod auto;
+mod camera;
+mod scene;
+
+pub use auto::{Auto, FieldOr};
+pub use camera::{
+    Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout, ShutterSpec, VibrationSpec,
+    ZoomSpec,
+};
+pub use scene::{HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
+
+/// Everything that one run depends on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Seed of every random number of the run.
+    #[serde(default)]
+    pub seed: u64,
+    /// The flight log and how to read it.
+    pub flight: FlightSpec,
+    /// How the camera platform follows the log.
+    #[serde(default)]
+    pub tracker: TrackerSpec,
+    /// The camera and all its imperfections.
+    #[serde(default)]
+    pub camera: CameraSpec,
+    /// What there is to see.
+    pub scene: SceneSpec,
+    /// Tolerances and the methods that keep them.
+    #[serde(default)]
+    pub quality: QualitySpec,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputSpec,
+}
+
+/// `[flight]`: the log and how its columns are meant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlightSpec {
+    /// The log file.
+    pub log: PathBuf,
+    /// Column layout; `auto` detects it or refuses.
+    #[serde(default)]
+    pub format: LogFormat,
+    /// Whether angles wrap or count turns.
+    #[serde(default)]
+    pub angles: AngleKind,
+    /// Where attitude comes from.
+    #[serde(default)]
+    pub attitude: AttitudeSource,
+    /// Origin of the local NED frame.
+    #[serde(default)]
+    pub origin: Origin,
+    /// Vertical reference of the log's heights.
+    #[serde(default)]
+    pub height: HeightReference,
+    /// Part of the log that is flown, in seconds from its first good row; `None` is all of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window_s: Option<[f64; 2]>,
+    /// Time scale: 2 flies the log twice as fast.
+    #[serde(default = "one")]
+    pub speed: f64,
+}
+
+/// Column layouts of flight logs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LogFormat {
+    /// Detect from header and values; refuse when two layouts fit.
+    #[default]
+    Auto,
+    /// `t, lat, lon, alt, roll, pitch, yaw` (degrees, metres up).
+    CsvLla,
+    /// `t, north, east, altitude up, roll, pitch, yaw`.
+    CsvXya,
+    /// `t, north, east, down, roll, pitch, yaw`.
+    CsvNed,
+    /// `t x y z qx qy qz qw`, world z up.
+    Tum,
+    /// `t_ns, x, y, z, qw, qx, qy, qz, ...`, world z up.
+    Euroc,
+}
+
+/// How Euler angles in a log are to be read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AngleKind {
+    /// `Wrapped`, unless a column leaves both [-180, 180] and [0, 360).
+    #[default]
+    Auto,
+    /// The short way between two rows.
+    Wrapped,
+    /// As written: 0 to 360 is a full turn.
+    Continuous,
+}
+
+/// Where the attitude of the platform comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum AttitudeSource {
+    /// The log's own columns.
+    #[default]
+    Log,
+    /// Heading from the track, bank from coordinated turns, pitch from the climb angle.
+    Track,
+}
+
+/// Origin of the local north-east-down frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Origin {
+    /// The first good row of the log (written `"first"`).
+    #[default]
+    #[serde(with = "auto::first")]
+    First,
+    /// `[latitude_deg, longitude_deg, height_m]` on WGS-84.
+    Geodetic([f64; 3]),
+}
+
+/// `[tracker]`: limits and method of the platform's motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackerSpec {
+    /// Method.
+    pub kind: TrackerKind,
+    /// Control rate of `sqrt`, knot rate of `spline`, in hertz.
+    pub rate_hz: f64,
+    /// Speed limit; `auto` is 1.2 times the 99.9th percentile of the log's own speed.
+    pub max_speed_m_s: Auto<f64>,
+    /// Acceleration limit.
+    pub max_acceleration_m_s2: f64,
+    /// Angular rate limit; `auto` as for speed.
+    pub max_angular_rate_deg_s: Auto<f64>,
+    /// Angular acceleration limit.
+    pub max_angular_acceleration_deg_s2: f64,
+}
+
+impl Default for TrackerSpec {
+    fn default() -> Self {
+        Self {
+            kind: TrackerKind::Sqrt,
+            rate_hz: 400.0,
+            max_speed_m_s: Auto::Auto,
+            max_acceleration_m_s2: 19.6,
+            max_angular_rate_deg_s: Auto::Auto,
+            max_angular_acceleration_deg_s2: 60.0,
+        }
+    }
+}
+
+/// Methods of following the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrackerKind {
+    /// The pose of the latest row.
+    Hold,
+    /// Straight lines and slerp between rows.
+    Linear,
+    /// Two nested SQRT loops per channel (paper section 3).
+    #[default]
+    Sqrt,
+    /// Limit-constrained quadratic B-spline over the whole log.
+    Spline,
+}
+
+/// `[quality]`: tolerances, and the methods that keep them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct QualitySpec {
+    /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
+    pub max_error_px: f64,
+    /// RMS bound in 1/255 of linear range, from blur sampling and resampling.
+    pub max_error_dn: f64,
+    /// Bound on the terrain level of detail, reported apart.
+    pub max_terrain_error_px: f64,
+    /// Temporal solver.
+    pub solver: Auto<Solver>,
+    /// Exposure samples per pixel.
+    pub blur_samples: Auto<u32>,
+    /// Footprint taps per axis of an output pixel.
+    pub footprint_taps: Auto<u32>,
+    /// Ideal frames per output frame.
+    pub key_frames: Auto<u32>,
+}
+
+impl Default for QualitySpec {
+    fn default() -> Self {
+        Self {
+            max_error_px: 0.05,
+            max_error_dn: 1.0,
+            max_terrain_error_px: 0.25,
+            solver: Auto::Auto,
+            blur_samples: Auto::Auto,
+            footprint_taps: Auto::Auto,
+            key_frames: Auto::Auto,
+        }
+    }
+}
+
+/// Temporal inverse methods.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// Exact relative pose per row and sample, depth by fixed-point iteration.
+    Reproject,
+}
+
+/// `[output]`: channels and file formats.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputSpec {
+    /// What to write for each frame.
+    pub channels: Vec<Channel>,
+    /// File formats; empty renders and reads back without encoding.
+    pub format: Vec<ImageFormat>,
+    /// Pixel type of EXR colour.
+    pub exr_pixel: ExrPixel,
+    /// EXR compression.
+    pub exr_compression: ExrCompression,
+}
+
+impl Default for OutputSpec {
+    fn default() -> Self {
+        Self {
+            channels: vec![Channel::Color],
+            format: vec![ImageFormat::Exr],
+            exr_pixel: ExrPixel::Half,
+            exr_compression: ExrCompression::Zip1,
+        }
+    }
+}
+
+/// Things a frame can give.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Channel {
+    /// The picture.
+    Color,
+    /// Planar depth at the row's mid-exposure, metres, 0 where nothing is.
+    Depth,
+    /// 1 where a ray exists.
+    Valid,
+    /// `rows.csv`: time, pose and velocity of each row.
+    Rows,
+    /// Ideal ray, source coordinate, time and world point of each pixel.
+    Coords,
+}
+
+/// Image file formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ImageFormat {
+    /// OpenEXR, linear, unquantised.
+    Exr,
+    /// PNG in the encoding of `camera.photometric.output`.
+    Png,
+}
+
+/// Pixel type of EXR colour channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExrPixel {
+    /// 16 bit floating point.
+    #[default]
+    Half,
+    /// 32 bit floating point.
+    Float,
+}
+
+/// EXR compression methods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExrCompression {
+    /// Stored.
+    None,
+    /// Run lengths.
+    Rle,
+    /// Deflate, one row a block.
+    #[default]
+    Zip1,
+    /// Deflate, 16 rows a block.
+    Zip16,
+    /// Wavelet.
+    Piz,
+}
+
+fn one() -> f64 {
+    1.0
+}

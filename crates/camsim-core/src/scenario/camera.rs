@@ -1,0 +1,244 @@
+//! `[camera]`: also the whole of a CAMERA.toml.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::FieldOr;
+
+/// Camera geometry, lens, shutter and photometry.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CameraSpec {
+    /// Width and height of the output.
+    pub size_px: [u32; 2],
+    /// Focal lengths (fx, fy).
+    pub focal_px: [f64; 2],
+    /// Principal point; (0, 0) is the centre of the top-left pixel. `None` is the image centre ((W-1)/2, (H-1)/2).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub principal_point_px: Option<[f64; 2]>,
+    /// Frames a second.
+    pub fps: f64,
+    /// Fraction of a frame period added to every stamp.
+    pub phase: f64,
+    /// Where and how the camera sits on the platform.
+    pub mount: MountSpec,
+    /// Distortion.
+    pub lens: LensSpec,
+    /// Calibrations over zoom, by ascending `at`; empty for a fixed lens.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub zoom: Vec<ZoomSpec>,
+    /// CSV `t_s,zoom`: zoom over log time, linear between rows, held outside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zoom_track: Option<PathBuf>,
+    /// When each row is exposed.
+    pub shutter: ShutterSpec,
+    /// Vignette, light, noise, output encoding.
+    pub photometric: PhotometricSpec,
+}
+
+impl Default for CameraSpec {
+    fn default() -> Self {
+        Self {
+            size_px: [640, 480],
+            focal_px: [500.0, 500.0],
+            principal_point_px: None,
+            fps: 30.0,
+            phase: 0.0,
+            mount: MountSpec::default(),
+            lens: LensSpec::default(),
+            zoom: Vec::new(),
+            zoom_track: None,
+            shutter: ShutterSpec::default(),
+            photometric: PhotometricSpec::default(),
+        }
+    }
+}
+
+/// `[camera.mount]`: the camera in the body frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MountSpec {
+    /// Roll, pitch, yaw (ZYX). (0, 0, 0) looks along the nose, pitch -90 straight down.
+    pub angles_deg: [f64; 3],
+    /// Lever arm in body axes (forward, right, down).
+    pub offset_m: [f64; 3],
+    /// Sinusoids added to the mount.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub vibration: Vec<VibrationSpec>,
+}
+
+/// One sinusoid `amplitude * sin(2 pi hz t + phase)` on one mount axis; t in log seconds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VibrationSpec {
+    /// Which degree of freedom.
+    pub axis: Axis,
+    /// Amplitude of a rotation axis.
+    #[serde(default)]
+    pub amplitude_deg: f64,
+    /// Amplitude of a translation axis.
+    #[serde(default)]
+    pub amplitude_m: f64,
+    /// Frequency.
+    pub hz: f64,
+    /// Phase at t = 0.
+    #[serde(default)]
+    pub phase_deg: f64,
+}
+
+/// Degrees of freedom of the mount.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axis {
+    /// Rotation about body x (forward).
+    Roll,
+    /// Rotation about body y (right).
+    Pitch,
+    /// Rotation about body z (down).
+    Yaw,
+    /// Translation forward.
+    X,
+    /// Translation right.
+    Y,
+    /// Translation down.
+    Z,
+}
+
+/// `[camera.lens]`: model and coefficients.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LensSpec {
+    /// Model.
+    pub model: LensModel,
+    /// `k1 k2 p1 p2 k3 k4 k5 k6`, trailing zeros may be left out; Kannala-Brandt: `k1 k2 k3 k4`.
+    pub coefficients: Vec<f64>,
+}
+
+/// Distortion models.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LensModel {
+    /// No distortion.
+    #[default]
+    Pinhole,
+    /// Radial (polynomial or rational) and tangential, as in OpenCV.
+    BrownConrady,
+    /// Equidistant fisheye polynomial, as in OpenCV's fisheye module.
+    KannalaBrandt,
+}
+
+/// One row of the zoom table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ZoomSpec {
+    /// Zoom value of this calibration.
+    pub at: f64,
+    /// Focal lengths.
+    pub focal_px: [f64; 2],
+    /// Principal point; `None` is the image centre.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub principal_point_px: Option<[f64; 2]>,
+    /// Distortion coefficients, in the lens model's order.
+    #[serde(default)]
+    pub coefficients: Vec<f64>,
+}
+
+/// `[camera.shutter]`: paper section 6.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ShutterSpec {
+    /// How much older than its stamp the image centre is (-t_d).
+    pub delay_ms: f64,
+    /// First row to last row (t_r).
+    pub readout_ms: f64,
+    /// Direction of the readout.
+    pub readout: Readout,
+    /// Exposure (t_e).
+    pub exposure_ms: f64,
+    /// Lag between the two fields.
+    pub interlace_ms: FieldOr,
+    /// Parity (0-based) of the rows of the earlier field.
+    pub first_field: Parity,
+}
+
+impl Default for ShutterSpec {
+    fn default() -> Self {
+        Self {
+            delay_ms: 0.0,
+            readout_ms: 0.0,
+            readout: Readout::default(),
+            exposure_ms: 0.0,
+            interlace_ms: FieldOr::Ms(0.0),
+            first_field: Parity::Even,
+        }
+    }
+}
+
+/// Rows by parity, counted from 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parity {
+    /// Rows 0, 2, 4, ...
+    #[default]
+    Even,
+    /// Rows 1, 3, 5, ...
+    Odd,
+}
+
+/// Readout directions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Readout {
+    /// First row first.
+    #[default]
+    TopToBottom,
+    /// Last row first.
+    BottomToTop,
+    /// First column first.
+    LeftToRight,
+    /// Last column first.
+    RightToLeft,
+}
+
+/// `[camera.photometric]`: paper section 7.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PhotometricSpec {
+    /// Vignette map image, resampled bilinearly to the output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vignette: Option<PathBuf>,
+    /// `[t1, t2]`: v < t1 is black, else min(v / t2, 1).
+    pub vignette_thresholds: [f64; 2],
+    /// Gain on linear values.
+    pub light: f64,
+    /// Standard deviation of Gaussian noise on linear values.
+    pub noise_sigma: f64,
+    /// Encoding of PNG files.
+    pub output: OutputEncoding,
+}
+
+impl Default for PhotometricSpec {
+    fn default() -> Self {
+        Self { vignette: None, vignette_thresholds: [0.05, 0.5], light: 1.0, noise_sigma: 0.0, output: OutputEncoding::default() }
+    }
+}
+
+/// Encodings of the encoded formats.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutputEncoding {
+    /// 32 bit linear; PNG falls back to 16 bit linear.
+    LinearF32,
+    /// 16 bit float linear; PNG falls back to 16 bit linear.
+    LinearF16,
+    /// sRGB, 8 bit.
+    #[default]
+    Srgb8,
+    /// Linear, 8 bit.
+    Linear8,
+    /// Linear luminance, 8 bit.
+    Luma8,
+    /// Linear luminance, 16 bit.
+    Luma16,
+}

@@ -1,0 +1,1 @@
+//! The ideal render and the reverse pipeline on wgpu.
