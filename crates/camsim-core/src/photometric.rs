@@ -1,1 +1,93 @@
-//! (being written)
+//! Vignette, light, noise, saturation: paper section 7 and fig. 9, on linear values. Twin of `shaders/reverse/photometric.wgsl`.
+
+use crate::{
+    noise::{NOISE_STREAM, normal4},
+    scenario::{OutputEncoding, PhotometricSpec},
+    sequence::GrayImage,
+};
+
+/// Weight of a vignette value: `v < t1` is black, else `min(v / t2, 1)`.
+#[must_use]
+pub fn vignette_weight(value: f32, thresholds: [f64; 2]) -> f32 {
+    let [black, full] = thresholds.map(|t| t as f32);
+    if value < black {
+        0.0
+    } else if full > 0.0 {
+        (value / full).min(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// Vignette weights at output size: the map resampled bilinearly (pixel centres, edges held), then the thresholds.
+#[must_use]
+pub fn vignette_weights(map: &GrayImage, size_px: [u32; 2], thresholds: [f64; 2]) -> Vec<f32> {
+    let axis = |out: u32, out_size: u32, in_size: u32| {
+        let at = ((f64::from(out) + 0.5) * f64::from(in_size) / f64::from(out_size) - 0.5).clamp(0.0, f64::from(in_size - 1));
+        let low = at.floor() as u32;
+        (low, (low + 1).min(in_size - 1), (at - at.floor()) as f32)
+    };
+    let at = |x: u32, y: u32| map.values[(y * map.size_px[0] + x) as usize];
+    let mut weights = Vec::with_capacity((size_px[0] * size_px[1]) as usize);
+    for y in 0..size_px[1] {
+        let (y0, y1, ty) = axis(y, size_px[1], map.size_px[1]);
+        for x in 0..size_px[0] {
+            let (x0, x1, tx) = axis(x, size_px[0], map.size_px[0]);
+            let top = at(x0, y0) + tx * (at(x1, y0) - at(x0, y0));
+            let bottom = at(x0, y1) + tx * (at(x1, y1) - at(x0, y1));
+            weights.push(vignette_weight(top + ty * (bottom - top), thresholds));
+        }
+    }
+    weights
+}
+
+/// Whether one luminance value stands for all three channels.
+#[must_use]
+pub fn is_mono(output: OutputEncoding) -> bool {
+    matches!(output, OutputEncoding::Luma8 | OutputEncoding::Luma16)
+}
+
+/// Final linear value of a pixel: `clamp(color * weight * light + sigma * n, 0, 1)`.
+#[must_use]
+pub fn photometric(spec: &PhotometricSpec, color: [f32; 3], weight: f32, pixel: [u32; 2], frame: u32, seed: u64, table: &[f32]) -> [f32; 3] {
+    let mono = is_mono(spec.output);
+    let luma = 0.212_6 * color[0] + 0.715_2 * color[1] + 0.072_2 * color[2];
+    let gain = weight * spec.light as f32;
+    let noise = if spec.noise_sigma > 0.0 { normal4(pixel, frame, seed, NOISE_STREAM, table) } else { [0.0; 4] };
+    std::array::from_fn(|channel| {
+        let value = if mono { luma } else { color[channel] };
+        let n = if mono { noise[0] } else { noise[channel] };
+        (value * gain + spec.noise_sigma as f32 * n).clamp(0.0, 1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thresholds_cut_and_saturate() {
+        let t = [0.1, 0.5];
+        assert_eq!(vignette_weight(0.09, t), 0.0);
+        assert_eq!(vignette_weight(0.1, t), 0.2);
+        assert_eq!(vignette_weight(0.25, t), 0.5);
+        assert_eq!(vignette_weight(0.9, t), 1.0);
+    }
+
+    #[test]
+    fn resampling_keeps_a_ramp_and_its_edges() {
+        let map = GrayImage { size_px: [4, 1], values: vec![0.0, 1.0, 2.0, 3.0] };
+        let weights = vignette_weights(&map, [8, 2], [-1.0, 10.0]);
+        let expected = [0.0, 0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.0].map(|v: f32| v / 10.0);
+        for (i, weight) in weights.iter().enumerate() {
+            assert!((weight - expected[i % 8]).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn mono_output_has_one_noise_for_all_channels() {
+        let spec = PhotometricSpec { output: OutputEncoding::Luma8, noise_sigma: 0.05, ..PhotometricSpec::default() };
+        let value = photometric(&spec, [0.5, 0.4, 0.3], 1.0, [3, 4], 0, 1, &crate::noise::tail_table());
+        assert!(value[0] == value[1] && value[1] == value[2]);
+    }
+}

@@ -1,1 +1,246 @@
-//! (being written)
+//! Temporal inverse and gather: output ray + instant -> where to look in the ideal frame (paper section 6).
+//!
+//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`.
+
+use glam::{DMat3, DVec2, DVec3};
+
+/// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IdealGeometry {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Focal lengths.
+    pub focal_px: DVec2,
+    /// Principal point, in pixels of this frame (may lie outside).
+    pub principal_px: DVec2,
+}
+
+impl IdealGeometry {
+    /// Pixel of a direction given in key-camera coordinates (any positive scale).
+    #[must_use]
+    pub fn px_from_point(&self, in_key: DVec3) -> DVec2 {
+        self.focal_px * (in_key.truncate() / in_key.z) + self.principal_px
+    }
+
+    /// Whether a position lies on the frame's pixels.
+    #[must_use]
+    pub fn contains(&self, at_px: DVec2) -> bool {
+        at_px.cmpge(DVec2::splat(-0.5)).all() && at_px.x <= f64::from(self.size_px[0]) - 0.5 && at_px.y <= f64::from(self.size_px[1]) - 0.5
+    }
+}
+
+/// A depth image of the ideal frame, inverse planar depth in 1/m, 0 = sky.
+#[derive(Clone, Copy, Debug)]
+pub struct InverseDepthImage<'a> {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Row-major values.
+    pub values: &'a [f32],
+}
+
+impl InverseDepthImage<'_> {
+    /// Bilinear in 1/z (exact on planes); the nearest texel where the four around belong to different surfaces.
+    #[must_use]
+    pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
+        let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
+        let at = at_px.clamp(DVec2::ZERO, last);
+        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
+        let t = at - base;
+        let load = |dx: f64, dy: f64| {
+            let (x, y) = ((base.x + dx).min(last.x) as usize, (base.y + dy).min(last.y) as usize);
+            f64::from(self.values[y * self.size_px[0] as usize + x])
+        };
+        let (d00, d10, d01, d11) = (load(0.0, 0.0), load(1.0, 0.0), load(0.0, 1.0), load(1.0, 1.0));
+        let low = d00.min(d10).min(d01).min(d11);
+        let high = d00.max(d10).max(d01).max(d11);
+        if low > 0.9 * high {
+            let top = d00 + t.x * (d10 - d00);
+            let bottom = d01 + t.x * (d11 - d01);
+            top + t.y * (bottom - top)
+        } else {
+            match (t.x > 0.5, t.y > 0.5) {
+                (false, false) => d00,
+                (true, false) => d10,
+                (false, true) => d01,
+                (true, true) => d11,
+            }
+        }
+    }
+}
+
+/// Where an output ray looks in the ideal frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// Ideal pixels.
+    pub at_px: DVec2,
+    /// Inverse planar depth in the line's own camera, 1/m; 0 = sky.
+    pub inverse_depth: f64,
+}
+
+/// Exact relative pose, depth by fixed-point iteration; `None` behind the key camera or outside the ideal frame.
+///
+/// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key frame's inverse depth w_key
+/// there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the error by `(parallax px) |grad w| / w`.
+#[must_use]
+pub fn reproject(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, depth: &InverseDepthImage<'_>, ideal: &IdealGeometry) -> Option<Source> {
+    let (rotation, shift) = key_from_line;
+    let direction = rotation * uv.extend(1.0);
+    let mut w = 0.0;
+    for _ in 0..iterations {
+        let found = depth.inverse_depth(ideal.px_from_point(direction + w * shift));
+        let scale = 1.0 - shift.z * found;
+        if scale > 1e-3 {
+            w = found * direction.z / scale;
+        }
+    }
+    let in_key = direction + w * shift;
+    let at_px = ideal.px_from_point(in_key);
+    (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+}
+
+/// Samples for a stretch of path: `min(a L, L + 16)`, at least `at_least`, at most `cap` (NUMERICS section 3: a = 2 keeps white texture below 1/255).
+#[must_use]
+pub fn samples_for(length_px: f64, samples_per_px: f64, at_least: u32, cap: u32) -> u32 {
+    ((samples_per_px * length_px).min(length_px + 16.0).ceil() as u32).clamp(at_least, cap.max(at_least))
+}
+
+/// A linear colour image of the ideal frame.
+#[derive(Clone, Copy, Debug)]
+pub struct ColorImage<'a> {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// Row-major R G B A.
+    pub rgba: &'a [f32],
+}
+
+impl ColorImage<'_> {
+    /// Bilinear colour, edges held.
+    #[must_use]
+    pub fn sample(&self, at_px: DVec2) -> DVec3 {
+        let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
+        let at = at_px.clamp(DVec2::ZERO, last);
+        let base = at.floor();
+        let t = at - base;
+        let load = |dx: f64, dy: f64| {
+            let (x, y) = ((base.x + dx).min(last.x) as usize, (base.y + dy).min(last.y) as usize);
+            let i = 4 * (y * self.size_px[0] as usize + x);
+            DVec3::new(f64::from(self.rgba[i]), f64::from(self.rgba[i + 1]), f64::from(self.rgba[i + 2]))
+        };
+        let top = load(0.0, 0.0).lerp(load(1.0, 0.0), t.x);
+        let bottom = load(0.0, 1.0).lerp(load(1.0, 1.0), t.x);
+        top.lerp(bottom, t.y)
+    }
+}
+
+/// Footprint of an output pixel in the ideal frame: columns of d(ideal px)/d(output px) and taps along each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Ideal pixels per output pixel along x.
+    pub dx: DVec2,
+    /// Ideal pixels per output pixel along y.
+    pub dy: DVec2,
+    /// Taps along each.
+    pub taps: [u32; 2],
+}
+
+impl Footprint {
+    /// As many taps as ideal pixels are covered, at most `max_taps` an axis.
+    #[must_use]
+    pub fn new(dx: DVec2, dy: DVec2, max_taps: u32) -> Self {
+        let taps = [dx, dy].map(|d| ((d.length() - 0.1).ceil() as u32).clamp(1, max_taps.max(1)));
+        Self { dx, dy, taps }
+    }
+
+    /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
+    #[must_use]
+    pub fn offset_px(&self, i: u32) -> DVec2 {
+        let [nx, ny] = self.taps;
+        let fx = (f64::from(i % nx) + 0.5) / f64::from(nx) - 0.5;
+        let fy = (f64::from((i / nx) % ny) + 0.5) / f64::from(ny) - 0.5;
+        self.dx * fx + self.dy * fy
+    }
+}
+
+/// Mean colour over the exposure along the polyline `nodes_px` (equal time on each segment), midpoints uniform in time.
+#[must_use]
+pub fn gather(nodes_px: &[DVec2], area: &Footprint, color: &ColorImage<'_>, samples_per_px: f64, cap: u32) -> DVec3 {
+    let taps = area.taps[0] * area.taps[1];
+    if nodes_px.len() < 2 {
+        let at = nodes_px.first().copied().unwrap_or_default();
+        return (0..taps).map(|i| color.sample(at + area.offset_px(i))).sum::<DVec3>() / f64::from(taps);
+    }
+    let segments = nodes_px.len() as u32 - 1;
+    let at_least = taps.div_ceil(segments);
+    let (mut sum, mut tap) = (DVec3::ZERO, 0);
+    for ends in nodes_px.windows(2) {
+        let count = samples_for(ends[0].distance(ends[1]), samples_per_px, at_least, cap);
+        let mut part = DVec3::ZERO;
+        for i in 0..count {
+            let t = (f64::from(i) + 0.5) / f64::from(count);
+            part += color.sample(ends[0].lerp(ends[1], t) + area.offset_px(tap));
+            tap += 1;
+        }
+        sum += part / f64::from(count);
+    }
+    sum / f64::from(segments)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    /// A tilted plane `n . x = 1` in key coordinates has inverse depth `n . (x/z)`: linear over the image.
+    fn plane_image(ideal: &IdealGeometry, normal: DVec3) -> Vec<f32> {
+        let [w, h] = ideal.size_px;
+        (0..w * h)
+            .map(|i| {
+                let px = DVec2::new(f64::from(i % w), f64::from(i / w));
+                normal.dot(((px - ideal.principal_px) / ideal.focal_px).extend(1.0)) as f32
+            })
+            .collect()
+    }
+
+    #[test]
+    fn reprojection_over_a_plane_is_its_homography() {
+        let ideal = IdealGeometry { size_px: [200, 150], focal_px: DVec2::splat(150.0), principal_px: DVec2::new(99.5, 74.5) };
+        let normal = DVec3::new(0.002, -0.003, 0.02);
+        let values = plane_image(&ideal, normal);
+        let depth = InverseDepthImage { size_px: ideal.size_px, values: &values };
+        let rotation = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::ZYX, 0.1, -0.05, 0.07));
+        let shift = DVec3::new(0.8, -0.5, 1.1);
+        for uv in [DVec2::new(0.0, 0.0), DVec2::new(0.2, -0.15), DVec2::new(-0.25, 0.2)] {
+            // x_key = R x + t and n . x_key = 1 give z (n . R d) = 1 - n . t.
+            let d = uv.extend(1.0);
+            let z = (1.0 - normal.dot(shift)) / normal.dot(rotation * d);
+            let exact = ideal.px_from_point(rotation * d * z + shift);
+            let found = reproject(uv, (rotation, shift), 12, &depth, &ideal).expect("in view");
+            // f32 depth: 6e-8 relative times about 8 px of parallax.
+            assert!((found.at_px - exact).length() < 2e-6 && (found.inverse_depth * z - 1.0).abs() < 1e-6, "{found:?} {exact}");
+            let two = reproject(uv, (rotation, shift), 2, &depth, &ideal).expect("in view");
+            assert!((two.at_px - exact).length() < 0.2, "two look-ups: {}", (two.at_px - exact).length());
+        }
+    }
+
+    #[test]
+    fn surfaces_are_not_mixed_at_a_depth_edge() {
+        let values = [0.1_f32, 0.001, 0.1, 0.001];
+        let image = InverseDepthImage { size_px: [2, 2], values: &values };
+        assert_eq!(image.inverse_depth(DVec2::new(0.4, 0.2)), f64::from(0.1_f32));
+        assert_eq!(image.inverse_depth(DVec2::new(0.6, 0.2)), f64::from(0.001_f32));
+    }
+
+    #[test]
+    fn gathering_a_ramp_gives_its_value_at_the_mean_position() {
+        let size_px = [64, 8];
+        let rgba: Vec<f32> = (0..64 * 8).flat_map(|i| [(i % 64) as f32, 1.0, 0.0, 1.0]).collect();
+        let color = ColorImage { size_px, rgba: &rgba };
+        let area = Footprint::new(DVec2::new(2.3, 0.0), DVec2::new(0.0, 1.0), 4);
+        assert_eq!(area.taps, [3, 1]);
+        let nodes = [DVec2::new(10.0, 3.0), DVec2::new(20.0, 3.0), DVec2::new(40.0, 3.0)];
+        let mean = gather(&nodes, &area, &color, 2.0, 256);
+        // Equal time on both segments: (15 + 30) / 2. The cyclic taps leave at most half a tap of bias over the sample count.
+        assert!((mean.x - 22.5).abs() < 0.05 && (mean.y - 1.0).abs() < 1e-12, "{mean}");
+    }
+}

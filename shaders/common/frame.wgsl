@@ -1,0 +1,50 @@
+// Uniforms of one frame. Mirrors `camsim_gpu::layout::FrameUniforms`; a test compares the offsets.
+struct Frame {
+    // Output size.
+    size_px: vec2<u32>,
+    // Ideal frame: size, focal length and principal point in its own pixels (integer = pixel centre).
+    ideal_size_px: vec2<u32>,
+    ideal_focal_px: vec2<f32>,
+    ideal_principal_px: vec2<f32>,
+    // Output camera: used when there is no lens map.
+    focal_px: vec2<f32>,
+    principal_px: vec2<f32>,
+    // Depth buffer value = near_m / z.
+    near_m: f32,
+    // Poses of a line over the exposure; 1 = no blur. With more than one, the mid-exposure pose follows the nodes.
+    nodes: u32,
+    // 0: lines are rows, 1: lines are columns.
+    line_axis: u32,
+    // Lines of one field in the pose table, and fields (2 only for sideways readout with interlacing).
+    lines: u32,
+    fields: u32,
+    // Depth look-ups of the temporal inverse.
+    iterations: u32,
+    // Blur samples for each pixel of path length, beyond-16-px rule, and their cap.
+    samples_per_px: f32,
+    max_samples: u32,
+    // Footprint taps per axis at most.
+    max_taps: u32,
+    // Exposure phase in [-0.5, 0.5] at which coords are reported (0 = mid-exposure).
+    coords_phase: f32,
+    // Photometric.
+    light: f32,
+    noise_sigma: f32,
+    vignette_thresholds: vec2<f32>,
+    seed: vec2<u32>,
+    frame_number: u32,
+    // 1: one luminance value for all three channels.
+    mono: u32,
+    // Key camera in the world, for coords: NED position and the columns of ned_from_key.
+    key_position_ned_m: vec4<f32>,
+    ned_from_key_x: vec4<f32>,
+    ned_from_key_y: vec4<f32>,
+    ned_from_key_z: vec4<f32>,
+    // Depth difference in inverse metres times this is a parallax in ideal pixels over the exposure.
+    exposure_travel_px_m: f32,
+    pad0: f32,
+    pad1: f32,
+    pad2: f32,
+}
+
+@group(0) @binding(0) var<uniform> frame: Frame;

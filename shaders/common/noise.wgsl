@@ -1,0 +1,42 @@
+// Counter-based noise: a pure function of (seed, frame, pixel, stream), so frames may come in any order.
+// Twin: camsim_core::noise.
+
+// Inverse normal CDF over octaves of the tail probability; built by camsim_core::noise::tail_table.
+@group(0) @binding(1) var<storage, read> noise_table: array<f32>;
+
+// Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
+fn pcg4d(key: vec4<u32>) -> vec4<u32> {
+    var v = key * 1664525u + 1013904223u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    v ^= v >> vec4<u32>(16u);
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    return v;
+}
+
+// Standard normal from 32 random bits: bit 31 is the sign, bits 30..8 the tail probability p = (m + 0.5) / 2^24.
+// The low 8 bits of pcg4d are patterned and stay unused. Multiply-add only: equal on every machine to rounding.
+fn normal_from_bits(bits: u32) -> f32 {
+    let m = (bits >> 8u) & 0x7fffffu;
+    // Octave k holds p in [2^-(k+2), 2^-(k+1)); its 16 segments are linear.
+    let x = 2u * m + 1u;                    // odd, 1 .. 2^24 - 1: p = x / 2^25
+    let lead = countLeadingZeros(x) - 8u;   // 0 .. 23
+    let mantissa = (x << lead) & 0x7fffffu; // fraction of the octave, 23 bits
+    let segment = mantissa >> 19u;
+    let t = f32(mantissa & 0x7ffffu) * (1.0 / 524288.0);
+    let i = lead * 17u + segment;
+    let a = noise_table[i];
+    let value = a + t * (noise_table[i + 1u] - a);
+    return select(value, -value, (bits >> 31u) == 1u);
+}
+
+// Four independent standard normals of a pixel.
+fn normal4(pixel: vec2<u32>, stream: u32) -> vec4<f32> {
+    let bits = pcg4d(vec4<u32>(pixel.x | (pixel.y << 16u), frame.frame_number, frame.seed.x, frame.seed.y ^ (stream * 0x9e3779b9u)));
+    return vec4<f32>(normal_from_bits(bits.x), normal_from_bits(bits.y), normal_from_bits(bits.z), normal_from_bits(bits.w));
+}

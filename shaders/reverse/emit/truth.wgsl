@@ -1,0 +1,38 @@
+// Picture, depth and coordinates.
+@group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
+
+struct Truth {
+    // Ideal ray.
+    uv: vec2<f32>,
+    // Source in the ideal frame, pixels, at `frame.coords_phase`.
+    source_px: vec2<f32>,
+    // The ray's point in NED at mid-exposure, metres; NaN-free: 0 where nothing is.
+    point_ned_m: vec3<f32>,
+    // Planar depth in the line's own camera at mid-exposure, metres; 0 = nothing there.
+    depth_m: f32,
+}
+
+@group(3) @binding(1) var<storage, read_write> out_truth: array<Truth>;
+
+fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {
+    let i = pixel.y * frame.size_px.x + pixel.x;
+    out_color[i] = vec4<f32>(color, 1.0);
+    var truth = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
+    truth.source_px = source_at_phase(pixel, ray, frame.coords_phase).at_px;
+    let mid = temporal_inverse_with_depth(ray.uv, pose_mid(pixel));
+    if (mid.inverse_depth > 0.0) {
+        truth.depth_m = 1.0 / mid.inverse_depth;
+        // On the key ray of the source, at the depth found there: no absolute pose is differenced in f32.
+        let in_key = vec3<f32>((mid.at_px - frame.ideal_principal_px) / frame.ideal_focal_px, 1.0);
+        let p = in_key / max(inverse_depth(mid.at_px).value, 1e-12);
+        truth.point_ned_m = frame.key_position_ned_m.xyz
+            + p.x * frame.ned_from_key_x.xyz + p.y * frame.ned_from_key_y.xyz + p.z * frame.ned_from_key_z.xyz;
+    }
+    out_truth[i] = truth;
+}
+
+fn emit_invalid(pixel: vec2<u32>) {
+    let i = pixel.y * frame.size_px.x + pixel.x;
+    out_color[i] = vec4<f32>(0.0);
+    out_truth[i] = Truth(vec2<f32>(0.0), vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
+}

@@ -1,0 +1,18 @@
+// No exposure: footprint taps around one source.
+#import reverse/gather/footprint.wgsl
+
+fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
+    let source = temporal_inverse(ray.uv, pose_mid(pixel));
+    let area = footprint(ray);
+    let taps = area.taps.x * area.taps.y;
+    var sum = vec3<f32>(0.0);
+    for (var i = 0u; i < taps; i++) {
+        sum += ideal_color_at(source.at_px + tap_offset_px(area, i));
+    }
+    return Gathered(sum / f32(taps), source.inside);
+}
+
+// Source at exposure phase in [-0.5, 0.5]: without exposure all phases are one.
+fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
+    return temporal_inverse(ray.uv, pose_mid(pixel));
+}

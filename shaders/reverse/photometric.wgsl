@@ -1,0 +1,24 @@
+// Vignette, light, noise, saturation on linear values (paper section 7, fig. 9). Twin: camsim_core::photometric.
+
+// Vignette weights at output size, after thresholds; one value 1.0 when there is no vignette.
+@group(1) @binding(4) var<storage, read> vignette: array<f32>;
+
+const NOISE_STREAM: u32 = 1u;
+
+fn vignette_weight(pixel: vec2<u32>) -> f32 {
+    let i = pixel.y * frame.size_px.x + pixel.x;
+    return vignette[min(i, arrayLength(&vignette) - 1u)];
+}
+
+fn photometric(pixel: vec2<u32>, color: vec3<f32>, weight: f32) -> vec3<f32> {
+    var value = color;
+    if (frame.mono == 1u) {
+        value = vec3<f32>(dot(color, vec3<f32>(0.2126, 0.7152, 0.0722)));
+    }
+    value *= weight * frame.light;
+    if (frame.noise_sigma > 0.0) {
+        let n = normal4(pixel, NOISE_STREAM);
+        value += frame.noise_sigma * select(n.xyz, n.xxx, frame.mono == 1u);
+    }
+    return clamp(value, vec3<f32>(0.0), vec3<f32>(1.0));
+}

@@ -1,0 +1,37 @@
+// With a lens: the ray is read from the lens map that the lens_inverse stage wrote.
+#import reverse/ray/interface.wgsl
+
+@group(2) @binding(0) var lens_map: texture_2d<f32>;
+
+// Above this the texel says "no pre-image"; see the lens_inverse stage.
+const INVALID_ABOVE: f32 = 1e29;
+
+// One-sided or central difference of the map along `step`, over valid texels only.
+fn map_difference(pixel: vec2<i32>, step: vec2<i32>, centre: vec2<f32>) -> vec2<f32> {
+    let last = vec2<i32>(frame.size_px) - 1;
+    let after_at = min(pixel + step, last);
+    let before_at = max(pixel - step, vec2<i32>(0));
+    let after = textureLoad(lens_map, after_at, 0).xy;
+    let before = textureLoad(lens_map, before_at, 0).xy;
+    let has_after = after.x < INVALID_ABOVE && any(after_at != pixel);
+    let has_before = before.x < INVALID_ABOVE && any(before_at != pixel);
+    if (has_after && has_before) {
+        return 0.5 * (after - before);
+    }
+    if (has_after) {
+        return after - centre;
+    }
+    if (has_before) {
+        return centre - before;
+    }
+    return vec2<f32>(0.0);
+}
+
+fn lens_ray(pixel: vec2<u32>) -> Ray {
+    let at = vec2<i32>(pixel);
+    let uv = textureLoad(lens_map, at, 0).xy;
+    if (uv.x >= INVALID_ABOVE) {
+        return Ray(vec2<f32>(0.0), vec2<f32>(0.0), vec2<f32>(0.0), false);
+    }
+    return Ray(uv, map_difference(at, vec2<i32>(1, 0), uv), map_difference(at, vec2<i32>(0, 1), uv), true);
+}

@@ -1,0 +1,34 @@
+// The reverse pipeline (paper section 2): for each output pixel
+//   lens inverse (a map) -> line time and pose -> temporal inverse -> gather over the exposure -> photometric -> output.
+// Slots are filled by the pipeline key; every filling of a slot defines the same functions.
+#import common/frame.wgsl
+#import common/noise.wgsl
+#import reverse/ideal_frame.wgsl
+#import <slot:ray>
+#import <slot:temporal_inverse>
+#import <slot:gather>
+#import reverse/photometric.wgsl
+#import <slot:emit>
+
+@compute @workgroup_size(8, 8)
+fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
+    let pixel = id.xy;
+    if (pixel.x >= frame.size_px.x || pixel.y >= frame.size_px.y) {
+        return;
+    }
+    let ray = lens_ray(pixel);
+    if (!ray.valid) {
+        emit_invalid(pixel);
+        return;
+    }
+    let weight = vignette_weight(pixel);
+    var gathered = Gathered(vec3<f32>(0.0), true);
+    if (weight > 0.0) {
+        gathered = gather(pixel, ray);
+    }
+    if (!gathered.inside) {
+        emit_invalid(pixel);
+        return;
+    }
+    emit(pixel, ray, photometric(pixel, gathered.color, weight));
+}

@@ -1,0 +1,29 @@
+// Nothing moves within the frame: one pose for every line.
+#import reverse/temporal_inverse/interface.wgsl
+
+struct Pose {
+    unused: f32,
+}
+
+fn pose_at_node(pixel: vec2<u32>, node: u32) -> Pose {
+    return Pose(0.0);
+}
+
+fn pose_mid(pixel: vec2<u32>) -> Pose {
+    return Pose(0.0);
+}
+
+fn mix_pose(a: Pose, b: Pose, t: f32) -> Pose {
+    return a;
+}
+
+fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
+    let at_px = frame.ideal_focal_px * uv + frame.ideal_principal_px;
+    return Source(at_px, 0.0, 0.0, inside_ideal(at_px));
+}
+
+fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
+    var source = temporal_inverse(uv, pose);
+    source.inverse_depth = inverse_depth(source.at_px).value;
+    return source;
+}
