@@ -23,7 +23,9 @@ apt_install() {
         return 1
     fi
     say "$reason: installing $* with apt"
-    if as_root apt-get update -q >&2 && as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "$@" >&2; then
+    # One broken third-party source makes the update fail, but rarely the packages needed here.
+    as_root apt-get update -q >&2 || true
+    if as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends "$@" >&2; then
         return 0
     fi
     say "could not install them. As root: apt-get update && apt-get install $*"
