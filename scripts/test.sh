@@ -1,0 +1,35 @@
+#!/bin/sh
+# The whole test suite, from a fresh clone: installs what is missing, then formatting, lints, tests.
+#   CAMSIM_DATA=DIR    also runs the tests on real flights, terrains and calibrations that are not part of the repository
+#   CAMSIM_SKIP_GPU=1  shows the tests that need an adapter as ignored; without it they fail where there is none
+set -eu
+cd "$(dirname "$0")/.."
+. scripts/setup.sh
+
+setup
+say "test data: ${CAMSIM_DATA:-none (CAMSIM_DATA is unset; tests that need it return early)}"
+
+if cargo fmt --version >/dev/null 2>&1; then
+    say "formatting"
+    cargo fmt --all --check
+else
+    say "formatting not checked: rustup component add rustfmt"
+fi
+
+if [ "${CAMSIM_SKIP_GPU:-}" = 1 ]; then
+    say "CAMSIM_SKIP_GPU=1: tests that need an adapter are ignored"
+else
+    say "adapter"
+    cargo run -- info
+fi
+
+if cargo clippy --version >/dev/null 2>&1; then
+    say "lints"
+    cargo clippy --workspace --all-targets -- -D warnings
+else
+    say "lints not checked: rustup component add clippy"
+fi
+
+say "tests"
+cargo test --workspace
+say "all passed"
