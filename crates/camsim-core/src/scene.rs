@@ -1,5 +1,28 @@
-//! The scene as plain data.
+//! The scene as plain data: terrain, meshes, pictures, sky, fog. No GPU and no file format in here.
+//!
+//! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so that the renderer can form
+//! camera-relative coordinates without cancellation.
+
+pub mod mesh;
+pub mod terrain;
+pub mod texture;
+
+pub use mesh::{Mesh, MeshVertex, Wrap};
+pub use terrain::{
+    Aabb, CHUNK_CELLS, ChunkDraw, LEVELS, LevelError, LodSelection, Terrain, TerrainChunk, TerrainError, TerrainHit, TerrainVertex,
+    lod_vertex, select_lod, snap,
+};
+pub use texture::{Encoding, MipLevel, Texture, linear_from_srgb, srgb_from_linear};
 
 /// What there is to see.
-#[derive(Clone, Debug)]
-pub struct Scene;
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Ground from an elevation model.
+    pub terrain: Option<Terrain>,
+    /// Everything else that has a surface (the planar pattern is one of them).
+    pub meshes: Vec<Mesh>,
+    /// Colour where no surface is, linear light.
+    pub sky_linear: [f32; 3],
+    /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
+    pub fog_visibility_m: Option<f64>,
+}

@@ -1,0 +1,93 @@
+//! Textured triangle meshes.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Texture;
+
+/// What a texture shows outside of 0..=1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The nearest border pixel.
+    #[default]
+    Clamp,
+    /// The picture again.
+    Repeat,
+}
+
+/// A corner of a [`Mesh`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct MeshVertex {
+    /// North, east, down in metres from [`Mesh::origin_ned_m`].
+    pub position_m: [f32; 3],
+    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right one.
+    pub uv: [f32; 2],
+}
+
+/// A textured surface; visible from both sides.
+#[derive(Clone, Debug)]
+pub struct Mesh {
+    /// Corners.
+    pub vertices: Vec<MeshVertex>,
+    /// Three a triangle, each below `vertices.len()`.
+    pub indices: Vec<u32>,
+    /// The picture on it.
+    pub texture: Arc<Texture>,
+    /// NED position of the vertices' origin, metres.
+    pub origin_ned_m: DVec3,
+    /// Behaviour outside of the picture.
+    pub wrap: Wrap,
+}
+
+impl Mesh {
+    /// A level picture on the ground: image top to the north, image left to the west, `width_m` from the picture's left edge to its
+    /// right edge; the height follows from square pixels. `centre_ned_m` is the middle of the picture.
+    pub fn level_picture(texture: Arc<Texture>, centre_ned_m: DVec3, width_m: f64) -> Self {
+        let [width_px, height_px] = texture.size_px.map(f64::from);
+        let half_east = (0.5 * width_m) as f32;
+        let half_north = (0.5 * width_m * height_px / width_px) as f32;
+        let corner =
+            |u: f32, v: f32| MeshVertex { position_m: [half_north * (1.0 - 2.0 * v), half_east * (2.0 * u - 1.0), 0.0], uv: [u, v] };
+        Self {
+            vertices: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)],
+            // The diagonal runs from north-west to south-east, as in the terrain.
+            indices: vec![0, 3, 1, 0, 2, 3],
+            texture,
+            origin_ned_m: centre_ned_m,
+            wrap: Wrap::Clamp,
+        }
+    }
+
+    /// NED position of a vertex, metres.
+    pub fn position_ned_m(&self, vertex: u32) -> DVec3 {
+        self.origin_ned_m + glam::Vec3::from(self.vertices[vertex as usize].position_m).as_dvec3()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Encoding;
+
+    #[test]
+    fn a_level_picture_has_its_top_in_the_north_and_its_left_in_the_west() {
+        let texture = Texture { size_px: [4, 2], rgba8: vec![255; 32], encoding: Encoding::Srgb };
+        let mesh = Mesh::level_picture(Arc::new(texture), DVec3::new(100.0, -50.0, 3.0), 40.0);
+        let top_left = mesh.vertices.iter().position(|v| v.uv == [0.0, 0.0]).expect("corner");
+        assert_eq!(mesh.position_ned_m(top_left as u32), DVec3::new(110.0, -70.0, 3.0));
+        let bottom_right = mesh.vertices.iter().position(|v| v.uv == [1.0, 1.0]).expect("corner");
+        assert_eq!(mesh.position_ned_m(bottom_right as u32), DVec3::new(90.0, -30.0, 3.0));
+        // Both triangles turn the same way and cover the rectangle.
+        let area: f64 = mesh
+            .indices
+            .chunks_exact(3)
+            .map(|t| {
+                let [a, b, c] = [t[0], t[1], t[2]].map(|i| mesh.position_ned_m(i));
+                0.5 * (b - a).cross(c - a).z
+            })
+            .sum();
+        assert!((area.abs() - 800.0).abs() < 1e-9, "{area}");
+    }
+}

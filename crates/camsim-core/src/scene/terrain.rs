@@ -1,0 +1,186 @@
+//! Ground from a grid of heights: two triangles a cell, diagonal from north-west to south-east.
+//!
+//! The full grid is *the* surface. For drawing it is cut into chunks of 64x64 cells that can be drawn with every 2^L-th vertex only
+//! (level of detail L), with borders that fit without gaps.
+//!
+//! # Why there are no gaps
+//!
+//! * Vertex positions are rounded to multiples of one power of two, [`Terrain::quantum_m`], and chunk centres are whole metres. Offsets
+//!   are exact in f32, and so is `centre_ned_m - camera` for a camera position rounded to whole metres. Their f32 sum rounds the
+//!   same exact number for each chunk that shares a vertex, so the sums are equal bit by bit, at any distance.
+//! * Where levels differ, the finer chunk drops the border vertices that the coarser one does not have ([`snap`]).
+
+mod bounds;
+mod build;
+mod errors;
+mod query;
+mod select;
+mod stitch;
+#[cfg(test)]
+mod tests;
+
+use std::{fmt, ops::Range, sync::Arc};
+
+use glam::{DVec3, Vec3};
+
+pub use bounds::Aabb;
+use bounds::BlockTree;
+pub use query::TerrainHit;
+pub use select::{ChunkDraw, LodSelection, select_lod};
+pub use stitch::{lod_vertex, snap};
+
+use super::Texture;
+
+/// Cells along each side of a full chunk.
+pub const CHUNK_CELLS: u32 = 64;
+
+/// Levels of detail: 0 (every vertex) to 6 (one cell a chunk).
+pub const LEVELS: usize = 7;
+
+/// A corner of the grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct TerrainVertex {
+    /// North, east, down in metres from the chunk's centre: a multiple of [`Terrain::quantum_m`]. NaN for a void (no triangle uses it).
+    pub offset_m: [f32; 3],
+    /// Texture coordinates: (0, 0) is the outer corner of the top-left pixel, (1, 1) that of the bottom-right one.
+    pub uv: [f32; 2],
+}
+
+/// Largest deviation of a chunk's surface at one level from the full surface, in metres.
+///
+/// Corresponding points are those of equal grid coordinates (and so of equal texture coordinates up to interpolation). The distance
+/// between two piecewise linear surfaces is largest at a corner of the overlay of their triangles; all of them were looked at, so
+/// this is exact.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LevelError {
+    /// Distance in space.
+    pub total_m: f32,
+    /// The part of it in the north-east plane.
+    pub horizontal_m: f32,
+}
+
+/// Up to 64x64 cells that are drawn at one level of detail.
+#[derive(Clone, Debug)]
+pub struct TerrainChunk {
+    /// Origin of the vertices' offsets: whole metres.
+    pub centre_ned_m: DVec3,
+    /// Box around the valid vertices; empty if there is none.
+    pub bounds: Aabb,
+    /// Index of the north-west vertex in [`Terrain::vertices`]. Rows of `cells[0] + 1` vertices follow, from north to south.
+    pub first_vertex: u32,
+    /// Cells from west to east and from north to south, 1..=64.
+    pub cells: [u32; 2],
+    /// Deviation at each level if no neighbour is coarser; grows with the level, 0 at level 0.
+    pub error: [LevelError; LEVELS],
+    /// Deviation at each level for the worst choice of edges stitched to the next coarser level; grows with the level.
+    pub stitched_error: [LevelError; LEVELS],
+    /// For a chunk with voids: its triangles, as a range of [`Terrain::void_indices`]. Such a chunk is drawn at level 0 only.
+    pub void_indices: Option<Range<u32>>,
+}
+
+impl TerrainChunk {
+    /// Whether there is anything to draw.
+    pub fn has_surface(&self) -> bool {
+        self.void_indices.as_ref().is_none_or(|range| !range.is_empty())
+    }
+
+    /// Cells of this chunk's grid at a level, from west to east and from north to south.
+    pub fn cells_at(&self, level: u8) -> [u32; 2] {
+        self.cells.map(|cells| cells.div_ceil(1 << level))
+    }
+}
+
+/// A grid of heights as drawable chunks.
+#[derive(Clone)]
+pub struct Terrain {
+    /// Chunk after chunk; borders are stored in each chunk that has them.
+    pub vertices: Vec<TerrainVertex>,
+    /// Row after row from the north, each from the west.
+    pub chunks: Vec<TerrainChunk>,
+    /// Chunks from west to east and from north to south.
+    pub chunk_grid: [u32; 2],
+    /// Cells from west to east and from north to south.
+    pub cells: [u32; 2],
+    /// Triangles of the chunks with voids; counted from the chunk's first vertex.
+    pub void_indices: Vec<u32>,
+    /// Cells with a void corner: half of such a cell may still be there.
+    pub void_cells: u64,
+    /// The picture on the ground.
+    pub texture: Arc<Texture>,
+    /// Vertices lie on multiples of this, metres (a power of two).
+    pub quantum_m: f64,
+    /// Box around everything.
+    pub bounds: Aabb,
+    tree: BlockTree,
+}
+
+impl fmt::Debug for Terrain {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Terrain")
+            .field("cells", &self.cells)
+            .field("chunk_grid", &self.chunk_grid)
+            .field("void_cells", &self.void_cells)
+            .field("texture", &self.texture)
+            .field("quantum_m", &self.quantum_m)
+            .field("bounds", &self.bounds)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Why a grid is no terrain.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TerrainError {
+    /// No cell.
+    #[error("a grid of {cols} x {rows} heights has no cell: at least 2 x 2 are needed")]
+    TooSmall {
+        /// Vertices from west to east.
+        cols: u32,
+        /// Vertices from north to south.
+        rows: u32,
+    },
+    /// Vertex numbers must fit u32.
+    #[error("a grid of {cols} x {rows} heights is too large: crop or thin it to less than 4 000 000 000 vertices")]
+    TooLarge {
+        /// Vertices from west to east.
+        cols: u32,
+        /// Vertices from north to south.
+        rows: u32,
+    },
+    /// Arrays of the wrong length.
+    #[error("a grid of {cols} x {rows} heights needs {expected} values, but {got} were given")]
+    Length {
+        /// Vertices from west to east.
+        cols: u32,
+        /// Vertices from north to south.
+        rows: u32,
+        /// cols * rows.
+        expected: u64,
+        /// Length given.
+        got: u64,
+    },
+    /// Nothing but voids.
+    #[error("not one triangle of the grid has three valid heights")]
+    AllVoid,
+    /// Chunk positions must be exact.
+    #[error("the grid reaches {distance_m:.3e} m from the origin: the local frame ends at 1e7 m")]
+    TooFar {
+        /// Largest coordinate, metres.
+        distance_m: f64,
+    },
+}
+
+impl Terrain {
+    /// Position of vertex (i, j) of a chunk, i from the west, j from the north: NED metres, exact; NaN for a void.
+    pub fn position_ned_m(&self, chunk: u32, i: u32, j: u32) -> DVec3 {
+        let chunk = &self.chunks[chunk as usize];
+        let vertex = &self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize];
+        chunk.centre_ned_m + Vec3::from(vertex.offset_m).as_dvec3()
+    }
+
+    /// Number of chunk that holds cell (column, row) of the full grid, and the cell's place in that chunk.
+    fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
+        let [column, row] = cell.map(|n| n / CHUNK_CELLS);
+        (row * self.chunk_grid[0] + column, cell.map(|n| n % CHUNK_CELLS))
+    }
+}

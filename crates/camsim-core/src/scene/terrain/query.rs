@@ -1,0 +1,164 @@
+//! Rays and distances against the full surface, in f64.
+
+use glam::DVec3;
+
+use super::{
+    Terrain,
+    bounds::{BLOCK_CELLS, Node},
+    stitch::cell_triangles,
+};
+use crate::pose::CameraPose;
+
+/// Where a ray meets the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TerrainHit {
+    /// Ray parameter: the point is origin + t direction.
+    pub t: f64,
+    /// Texture coordinates there.
+    pub uv: [f64; 2],
+    /// Unit normal of the triangle, NED, towards the sky.
+    pub normal_ned: DVec3,
+}
+
+impl Terrain {
+    /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The direction need not have unit
+    /// length. Rays cannot slip through between triangles: the sign of an edge is the same number for both of its sides.
+    pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
+        let inverse = direction_ned.recip();
+        let mut best: Option<TerrainHit> = None;
+        let mut limit = t_max;
+        let root = self.tree.root();
+        let mut stack: Vec<(f64, Node)> = Vec::with_capacity(32);
+        stack.extend(self.tree.bounds(root).enter(origin_ned_m, inverse, limit).map(|t| (t, root)));
+        while let Some((t_enter, node)) = stack.pop() {
+            if t_enter > limit {
+                continue;
+            }
+            if node.level == 0 {
+                if let Some(hit) = self.intersect_block(node.at, origin_ned_m, direction_ned, limit) {
+                    limit = hit.t;
+                    best = Some(hit);
+                }
+                continue;
+            }
+            let below = stack.len();
+            for child in self.tree.children(node) {
+                stack.extend(self.tree.bounds(child).enter(origin_ned_m, inverse, limit).map(|t| (t, child)));
+            }
+            // Nearest last, so that it comes off first.
+            stack[below..].sort_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        best
+    }
+
+    /// Height of the full surface above a place in the tangent plane: the down coordinate of the topmost point, `None` off the terrain.
+    pub fn down_at(&self, north_m: f64, east_m: f64) -> Option<f64> {
+        let top = self.bounds.min.z - 1.0;
+        let hit = self.intersect(DVec3::new(north_m, east_m, top), DVec3::Z, self.bounds.max.z - top + 1.0)?;
+        Some(top + hit.t)
+    }
+
+    /// A lower bound of the distance from a point to the surface, from boxes around 8x8 cells; 0 inside such a box.
+    pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
+        self.nearest_box_m(position_ned_m, &|_| true)
+    }
+
+    /// An upper bound of the distance from a point to any point of the surface.
+    pub fn max_distance_m(&self, position_ned_m: DVec3) -> f64 {
+        self.bounds.farthest_m(position_ned_m)
+    }
+
+    /// As [`Terrain::min_distance_m`], among what the camera sees within `tangents` = [u_min, u_max, v_min, v_max] (u = x/z, v = y/z in
+    /// the optical frame); infinite if the terrain is out of sight.
+    pub fn min_distance_in_view_m(&self, camera: &CameraPose, tangents: [f64; 4]) -> f64 {
+        let frustum = Frustum::new(camera, tangents);
+        self.nearest_box_m(camera.position_ned_m, &|bounds| frustum.may_see(bounds))
+    }
+
+    fn nearest_box_m(&self, position_ned_m: DVec3, accept: &dyn Fn(&super::Aabb) -> bool) -> f64 {
+        let mut nearest = f64::INFINITY;
+        let mut stack = vec![self.tree.root()];
+        while let Some(node) = stack.pop() {
+            let bounds = self.tree.bounds(node);
+            let distance = bounds.distance_m(position_ned_m);
+            // Written so that a NaN distance goes nowhere.
+            if distance < nearest && accept(bounds) {
+                if node.level == 0 {
+                    nearest = distance;
+                } else {
+                    let below = stack.len();
+                    stack.extend(self.tree.children(node));
+                    let far = |node: &Node| self.tree.bounds(*node).distance_m(position_ned_m);
+                    stack[below..].sort_by(|a, b| far(b).total_cmp(&far(a)));
+                }
+            }
+        }
+        nearest
+    }
+
+    fn intersect_block(&self, block: [u32; 2], origin: DVec3, direction: DVec3, t_max: f64) -> Option<TerrainHit> {
+        let (chunk_index, [i0, j0]) = self.chunk_of_cell(block.map(|n| n * BLOCK_CELLS));
+        let chunk = &self.chunks[chunk_index as usize];
+        let mut best = None;
+        let mut limit = t_max;
+        for b in j0..(j0 + BLOCK_CELLS).min(chunk.cells[1]) {
+            for a in i0..(i0 + BLOCK_CELLS).min(chunk.cells[0]) {
+                for corners in cell_triangles([a, b], chunk.cells, 0, [0; 4]) {
+                    let points = corners.map(|[i, j]| self.position_ned_m(chunk_index, i, j));
+                    let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
+                    limit = t;
+                    let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
+                    let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
+                    let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
+                    best = Some(TerrainHit { t, uv, normal_ned: if normal.z > 0.0 { -normal } else { normal } });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Ray parameter in 0..=`t_max` and barycentric weights where a ray meets a triangle, from either side. Corners that are not finite are
+/// never met.
+///
+/// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates its volume in floating point,
+/// so two triangles agree on which side of their common edge a ray passes.
+pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+    let [a, b, c] = points.map(|p| p - origin);
+    let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction.dot(n));
+    let one_sided = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
+    let sum = wa + wb + wc;
+    if !one_sided || sum == 0.0 {
+        return None;
+    }
+    let normal = (b - a).cross(c - a);
+    let t = a.dot(normal) / direction.dot(normal);
+    (t >= 0.0 && t <= t_max).then(|| (t, [wa / sum, wb / sum, wc / sum]))
+}
+
+/// Half-spaces that a camera sees.
+pub(super) struct Frustum {
+    position_ned_m: DVec3,
+    /// Inward normals, NED.
+    normals: [DVec3; 5],
+}
+
+impl Frustum {
+    /// `tangents`: u_min, u_max, v_min, v_max.
+    pub fn new(camera: &CameraPose, tangents: [f64; 4]) -> Self {
+        let [u_min, u_max, v_min, v_max] = tangents;
+        let in_camera = [
+            DVec3::new(1.0, 0.0, -u_min),
+            DVec3::new(-1.0, 0.0, u_max),
+            DVec3::new(0.0, 1.0, -v_min),
+            DVec3::new(0.0, -1.0, v_max),
+            DVec3::Z,
+        ];
+        Self { position_ned_m: camera.position_ned_m, normals: in_camera.map(|n| camera.ned_from_camera * n) }
+    }
+
+    /// False only if the whole box is out of sight.
+    pub fn may_see(&self, bounds: &super::Aabb) -> bool {
+        !bounds.is_empty() && self.normals.iter().all(|&n| bounds.support(n) >= n.dot(self.position_ned_m))
+    }
+}

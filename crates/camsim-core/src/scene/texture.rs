@@ -1,0 +1,251 @@
+//! Pictures that cover surfaces, and their smaller versions.
+
+use std::fmt;
+
+use rayon::prelude::*;
+
+/// How the colour bytes of a [`Texture`] stand for light. Alpha is always linear.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Encoding {
+    /// IEC 61966-2-1 transfer curve.
+    #[default]
+    Srgb,
+    /// Proportional to light.
+    Linear,
+}
+
+impl Encoding {
+    /// Linear light of each of the 256 byte values.
+    fn decode_table(self) -> [f32; 256] {
+        std::array::from_fn(|byte| {
+            let stored = byte as f32 / 255.0;
+            match self {
+                Self::Srgb => linear_from_srgb(stored),
+                Self::Linear => stored,
+            }
+        })
+    }
+
+    fn encode_byte(self, linear: f32) -> u8 {
+        let stored = match self {
+            Self::Srgb => srgb_from_linear(linear),
+            Self::Linear => linear,
+        };
+        (stored.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+    }
+}
+
+/// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1).
+pub fn linear_from_srgb(stored: f32) -> f32 {
+    if stored <= 0.04045 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
+}
+
+/// sRGB value of linear light in 0..=1 (IEC 61966-2-1), the inverse of [`linear_from_srgb`].
+pub fn srgb_from_linear(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// A picture, row-major from its top-left pixel, four bytes a pixel. Alpha 0 marks pixels without content.
+#[derive(Clone, PartialEq)]
+pub struct Texture {
+    /// Width, height; both at least 1.
+    pub size_px: [u32; 2],
+    /// `4 * width * height` bytes, R G B A, not premultiplied.
+    pub rgba8: Vec<u8>,
+    /// Meaning of the colour bytes.
+    pub encoding: Encoding,
+}
+
+/// One of the smaller versions of a [`Texture`], in the encoding of the texture.
+#[derive(Clone, PartialEq)]
+pub struct MipLevel {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// `4 * width * height` bytes, R G B A, not premultiplied.
+    pub rgba8: Vec<u8>,
+}
+
+impl fmt::Debug for Texture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Texture").field("size_px", &self.size_px).field("encoding", &self.encoding).finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for MipLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("MipLevel").field("size_px", &self.size_px).finish_non_exhaustive()
+    }
+}
+
+/// Colour in linear light, premultiplied by alpha: the only form in which pixels may be averaged.
+struct LinearImage {
+    size_px: [usize; 2],
+    premultiplied: Vec<[f32; 4]>,
+}
+
+impl Texture {
+    /// One pixel of one colour.
+    pub fn uniform(rgba: [u8; 4], encoding: Encoding) -> Self {
+        Self { size_px: [1, 1], rgba8: rgba.to_vec(), encoding }
+    }
+
+    /// The levels 1, 2, ... down to 1x1 (level 0 is the texture itself); each side is half of the level above, rounded down, at least 1.
+    ///
+    /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it covers, so odd sizes keep
+    /// the picture in place. Colour is weighted by alpha: pixels without content do not darken their neighbours.
+    pub fn mips(&self) -> Vec<MipLevel> {
+        let mut levels = Vec::new();
+        let mut image = self.to_linear();
+        while image.size_px != [1, 1] {
+            image = image.half();
+            levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), rgba8: image.encode(self.encoding) });
+        }
+        levels
+    }
+
+    /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear sampling across the border of
+    /// the content does not pull in black. Alpha stays as it is. Does nothing to an opaque (or an empty) picture.
+    pub fn bleed_into_transparent(&mut self) {
+        let mut transparent = self.rgba8.chunks_exact(4).filter(|pixel| pixel[3] == 0).peekable();
+        if transparent.peek().is_none() {
+            return;
+        }
+        let levels = self.mips();
+        let width = self.size_px[0] as usize;
+        let [full_width, full_height] = self.size_px.map(|n| n as usize);
+        for (index, pixel) in self.rgba8.chunks_exact_mut(4).enumerate().filter(|(_, pixel)| pixel[3] == 0) {
+            let (x, y) = (index % width, index / width);
+            let donor = levels.iter().find_map(|level| {
+                let [w, h] = level.size_px.map(|n| n as usize);
+                let at = 4 * ((y * h / full_height).min(h - 1) * w + (x * w / full_width).min(w - 1));
+                (level.rgba8[at + 3] > 0).then(|| &level.rgba8[at..at + 3])
+            });
+            if let Some(rgb) = donor {
+                pixel[..3].copy_from_slice(rgb);
+            }
+        }
+    }
+
+    fn to_linear(&self) -> LinearImage {
+        let table = self.encoding.decode_table();
+        let premultiplied = self
+            .rgba8
+            .par_chunks_exact(4)
+            .map(|p| {
+                let alpha = f32::from(p[3]) / 255.0;
+                [table[p[0] as usize] * alpha, table[p[1] as usize] * alpha, table[p[2] as usize] * alpha, alpha]
+            })
+            .collect();
+        LinearImage { size_px: self.size_px.map(|n| n as usize), premultiplied }
+    }
+}
+
+impl LinearImage {
+    fn half(&self) -> Self {
+        let [width, height] = self.size_px;
+        let [to_width, to_height] = [(width / 2).max(1), (height / 2).max(1)];
+        let columns: Vec<_> = (0..to_width).map(|x| cover(x, width, to_width)).collect();
+        let mut premultiplied = vec![[0.0; 4]; to_width * to_height];
+        premultiplied.par_chunks_exact_mut(to_width).enumerate().for_each(|(y, row)| {
+            let (y0, y_weights) = cover(y, height, to_height);
+            for (pixel, (x0, x_weights)) in row.iter_mut().zip(&columns) {
+                for (dy, wy) in y_weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                    for (dx, wx) in x_weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                        let source = self.premultiplied[(y0 + dy) * width + x0 + dx];
+                        for (sum, value) in pixel.iter_mut().zip(source) {
+                            *sum += wy * wx * value;
+                        }
+                    }
+                }
+            }
+        });
+        Self { size_px: [to_width, to_height], premultiplied }
+    }
+
+    fn encode(&self, encoding: Encoding) -> Vec<u8> {
+        let mut bytes = vec![0; 4 * self.premultiplied.len()];
+        bytes.par_chunks_exact_mut(4).zip(&self.premultiplied).for_each(|(out, &[r, g, b, alpha])| {
+            if alpha > 0.0 {
+                for (byte, value) in out.iter_mut().zip([r, g, b]) {
+                    *byte = encoding.encode_byte(value / alpha);
+                }
+                // Any content at all must stay distinguishable from none.
+                out[3] = ((alpha * 255.0 + 0.5) as u8).max(1);
+            }
+        });
+        bytes
+    }
+}
+
+/// Source pixels that target pixel `to` of `to_size` covers among `from_size`: the first one and the share of each (sum 1).
+/// Halving covers at most 3 pixels: n / floor(n/2) <= 3.
+fn cover(to: usize, from_size: usize, to_size: usize) -> (usize, [f32; 3]) {
+    // In units of 1/to_size source pixels everything is an integer.
+    let (begin, end) = (to * from_size, (to + 1) * from_size);
+    let first = begin / to_size;
+    let weights = std::array::from_fn(|i| {
+        let pixel = (first + i) * to_size;
+        let overlap = end.min(pixel + to_size).saturating_sub(begin.max(pixel));
+        overlap as f32 / from_size as f32
+    });
+    (first, weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_transfer_curve_inverts_for_every_byte() {
+        for byte in 0..=255u8 {
+            let linear = linear_from_srgb(f32::from(byte) / 255.0);
+            assert_eq!(Encoding::Srgb.encode_byte(linear), byte);
+        }
+    }
+
+    #[test]
+    fn averaging_happens_in_linear_light() {
+        let texture = Texture { size_px: [2, 1], rgba8: vec![0, 0, 0, 255, 255, 255, 255, 255], encoding: Encoding::Srgb };
+        let mips = texture.mips();
+        // Half of the light is sRGB 188, not 128.
+        assert_eq!((mips.len(), &mips[0].rgba8[..]), (1, &[188, 188, 188, 255][..]));
+        let linear = Texture { encoding: Encoding::Linear, ..texture };
+        assert_eq!(linear.mips()[0].rgba8, [128, 128, 128, 255]);
+    }
+
+    #[test]
+    fn odd_sizes_are_weighted_by_area() {
+        // 3 -> 1: equal thirds. 5 -> 2: 1, 1, 1/2 | 1/2, 1, 1 of 2.5.
+        let texture = Texture {
+            size_px: [5, 1],
+            rgba8: [10, 20, 30, 40, 50].iter().flat_map(|&v| [v, v, v, 255]).collect(),
+            encoding: Encoding::Linear,
+        };
+        let mips = texture.mips();
+        assert_eq!(mips.iter().map(|m| m.size_px).collect::<Vec<_>>(), [[2, 1], [1, 1]]);
+        assert_eq!((mips[0].rgba8[0], mips[0].rgba8[4]), (18, 42));
+        assert_eq!(mips[1].rgba8[0], 30);
+        for size in [2, 3, 5, 7, 100, 641, 917] {
+            for to in 0..size / 2 {
+                let (first, weights) = cover(to, size, size / 2);
+                assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-6 && first < size);
+                assert!(weights.iter().enumerate().all(|(i, w)| *w == 0.0 || first + i < size));
+            }
+        }
+    }
+
+    #[test]
+    fn void_pixels_do_not_darken() {
+        let mut texture =
+            Texture { size_px: [4, 1], rgba8: vec![0, 0, 0, 0, 200, 100, 50, 255, 0, 0, 0, 0, 0, 0, 0, 0], encoding: Encoding::Srgb };
+        let mips = texture.mips();
+        assert_eq!(&mips[0].rgba8[..4], [200, 100, 50, 128]);
+        assert_eq!(&mips[0].rgba8[4..], [0, 0, 0, 0]);
+        assert_eq!(&mips[1].rgba8[..], [200, 100, 50, 64]);
+        texture.bleed_into_transparent();
+        for pixel in texture.rgba8.chunks_exact(4) {
+            assert_eq!(pixel[..3], [200, 100, 50]);
+        }
+        assert_eq!(texture.rgba8.iter().skip(3).step_by(4).copied().collect::<Vec<_>>(), [0, 255, 0, 0]);
+    }
+}
