@@ -9,9 +9,11 @@ use crate::lens::{Lens, LensError, LensModel};
 use crate::scenario::CameraSpec;
 
 mod check;
+mod lens_inverse;
 mod zoom;
 
 pub use check::LensCheck;
+pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
 /// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing error.

@@ -173,6 +173,15 @@ impl Lens {
         }
     }
 
+    /// A bound on the distorted radius of everything on the principal branch; infinite for a pinhole.
+    pub fn distorted_max(&self) -> f64 {
+        match self {
+            Self::Pinhole(_) => f64::INFINITY,
+            Self::BrownConrady(lens) => lens.fold.distorted_max(),
+            Self::KannalaBrandt(lens) => lens.distorted_max(),
+        }
+    }
+
     /// Ideal radius of the border of the principal branch in direction `phi` (radians from +u towards +v); infinite for a pinhole.
     pub fn fold_radius(&self, phi_rad: f64) -> f64 {
         self.fold_curve().map_or(f64::INFINITY, |fold| fold.radius(phi_rad))

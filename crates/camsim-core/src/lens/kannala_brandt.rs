@@ -35,6 +35,11 @@ impl KannalaBrandt {
         self.theta_max
     }
 
+    /// Distorted radius of that angle: nothing is imaged farther from the axis.
+    pub fn distorted_max(&self) -> f64 {
+        theta_d(&self.coefficients, self.theta_max)
+    }
+
     /// Forward; see the type.
     pub fn distort(&self, ideal: DVec2) -> DVec2 {
         distort(&self.coefficients, ideal)
@@ -58,7 +63,7 @@ impl KannalaBrandt {
     /// Bracketed Newton in theta, from the table; `None` beyond the largest angle.
     pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
         let radius = distorted.length();
-        if !distorted.is_finite() || radius > theta_d(&self.coefficients, self.theta_max) {
+        if !distorted.is_finite() || radius > self.distorted_max() {
             return None;
         }
         if radius < 1e-12 {
