@@ -1,1 +1,166 @@
-//! (being written)
+//! Camera intrinsics: pixel <-> ideal ray, the zoom table, and the check of a calibration.
+//!
+//! Pixels as in OpenCV: integer coordinates are pixel centres, (0, 0) is the centre of the top-left pixel, a centred principal point is
+//! `((W - 1)/2, (H - 1)/2)`.
+
+use glam::DVec2;
+
+use crate::lens::{Lens, LensError, LensModel};
+use crate::scenario::CameraSpec;
+
+mod check;
+mod lens_inverse;
+mod zoom;
+
+pub use check::LensCheck;
+pub use lens_inverse::INVALID_UV;
+pub use zoom::ZoomTable;
+
+/// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing error.
+const MAX_SIZE_PX: u32 = 32_768;
+
+/// What can be wrong with a camera.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// Zero or absurd size.
+    #[error("camera.size_px is [{0}, {1}]: both must be 1 to {MAX_SIZE_PX}")]
+    Size(u32, u32),
+    /// Zero, negative or non-finite focal length.
+    #[error("{key} is [{x}, {y}]: both must be positive finite pixels (a mirrored axis is not a camera; flip the image instead)")]
+    Focal {
+        /// Key in the file.
+        key: String,
+        /// fx.
+        x: f64,
+        /// fy.
+        y: f64,
+    },
+    /// Non-finite principal point.
+    #[error("{key} is [{x}, {y}]: both must be finite pixels; leave the key out for the image centre")]
+    PrincipalPoint {
+        /// Key in the file.
+        key: String,
+        /// cx.
+        x: f64,
+        /// cy.
+        y: f64,
+    },
+    /// The lens.
+    #[error("{key}: {source}")]
+    Lens {
+        /// Section in the file.
+        key: String,
+        /// What is wrong.
+        source: LensError,
+    },
+    /// Zoom values that do not ascend.
+    #[error(
+        "camera.zoom[{index}].at is {at}: the zoom table must be finite and strictly ascending in `at`; sort it and merge equal entries"
+    )]
+    ZoomOrder {
+        /// Position from 0.
+        index: usize,
+        /// The value.
+        at: f64,
+    },
+    /// A zoom value that is not a number.
+    #[error("the zoom value is {0}: it must be a finite number; check camera.zoom_track")]
+    ZoomValue(f64),
+}
+
+/// Intrinsics of a camera and its lens, checked. Immutable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraModel {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// fx, fy.
+    pub focal_px: DVec2,
+    /// cx, cy.
+    pub principal_point_px: DVec2,
+    /// Distortion.
+    pub lens: Lens,
+}
+
+impl CameraModel {
+    /// From plain numbers; `None` for the principal point is the image centre.
+    pub fn new(
+        size_px: [u32; 2],
+        focal_px: [f64; 2],
+        principal_point_px: Option<[f64; 2]>,
+        model: LensModel,
+        coefficients: &[f64],
+    ) -> Result<Self, CameraError> {
+        Self::with_key("camera", size_px, focal_px, principal_point_px, model, coefficients)
+    }
+
+    /// From `[camera]`, without its zoom table (see [`CameraModel::at_zoom`]).
+    pub fn from_spec(spec: &CameraSpec) -> Result<Self, CameraError> {
+        Self::new(spec.size_px, spec.focal_px, spec.principal_point_px, spec.lens.model, &spec.lens.coefficients)
+    }
+
+    /// From `[camera]` at one zoom value: its zoom table where it has one, else as [`CameraModel::from_spec`].
+    pub fn at_zoom(spec: &CameraSpec, zoom: f64) -> Result<Self, CameraError> {
+        match ZoomTable::from_spec(spec)? {
+            Some(table) => table.at(zoom),
+            None => Self::from_spec(spec),
+        }
+    }
+
+    fn with_key(
+        key: &str,
+        size_px: [u32; 2],
+        [fx, fy]: [f64; 2],
+        principal_point_px: Option<[f64; 2]>,
+        model: LensModel,
+        coefficients: &[f64],
+    ) -> Result<Self, CameraError> {
+        let [width, height] = size_px;
+        if width == 0 || height == 0 || width > MAX_SIZE_PX || height > MAX_SIZE_PX {
+            return Err(CameraError::Size(width, height));
+        }
+        if !(fx.is_normal() && fy.is_normal() && fx > 0.0 && fy > 0.0) {
+            return Err(CameraError::Focal { key: format!("{key}.focal_px"), x: fx, y: fy });
+        }
+        let centre = [0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0)];
+        let [cx, cy] = principal_point_px.unwrap_or(centre);
+        if !(cx.is_finite() && cy.is_finite()) {
+            return Err(CameraError::PrincipalPoint { key: format!("{key}.principal_point_px"), x: cx, y: cy });
+        }
+        let focal_px = DVec2::new(fx, fy);
+        let principal_point_px = DVec2::new(cx, cy);
+        // The start table of the inverse is spread over just what the image shows.
+        let reach =
+            image_corners(size_px).into_iter().map(|corner| ((corner - principal_point_px) / focal_px).length()).fold(0.0, f64::max);
+        let lens = Lens::with_reach(model, coefficients, reach).map_err(|source| CameraError::Lens { key: key.to_owned(), source })?;
+        Ok(Self { size_px, focal_px, principal_point_px, lens })
+    }
+
+    /// Where the ideal ray `(u, v, 1)` is imaged, pixels. The bare formula: also beyond the fold, where [`Lens::contains`] is false.
+    pub fn project(&self, ideal: DVec2) -> DVec2 {
+        self.pixel_from_distorted(self.lens.distort(ideal))
+    }
+
+    /// The ideal `(u, v)` seen at a pixel coordinate; `None` where the lens has no answer.
+    pub fn unproject(&self, pixel: DVec2) -> Option<DVec2> {
+        self.lens.undistort(self.distorted_from_pixel(pixel))
+    }
+
+    /// `f x + c`.
+    pub fn pixel_from_distorted(&self, distorted: DVec2) -> DVec2 {
+        distorted * self.focal_px + self.principal_point_px
+    }
+
+    /// `(p - c) / f`.
+    pub fn distorted_from_pixel(&self, pixel: DVec2) -> DVec2 {
+        (pixel - self.principal_point_px) / self.focal_px
+    }
+}
+
+/// Outer corners of the corner pixels.
+fn image_corners([width, height]: [u32; 2]) -> [DVec2; 4] {
+    let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
+    [DVec2::new(-0.5, -0.5), DVec2::new(right, -0.5), DVec2::new(-0.5, bottom), DVec2::new(right, bottom)]
+}
+
+#[cfg(test)]
+mod tests;

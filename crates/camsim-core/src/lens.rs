@@ -1,1 +1,212 @@
-//! (being written)
+//! Lens models: ideal `(u, v) = (x/z, y/z)` to distorted normalised coordinates, and back on the principal branch or not at all.
+//!
+//! A lens is regular in a star-shaped domain about its axis, [`Lens::fold_radius`] being the border: there the Jacobian's determinant,
+//! its trace, or the model's denominator reaches zero for the first time along a ray. Beyond the fold the formula goes on, but what it
+//! yields are mirror images that no real lens shows, so the inverse answers `None` for a point whose only pre-images lie there.
+//!
+//! Adding a model is one file here with the same five functions (`distort`, `jacobian`, `undistort`, domain, start table), one WGSL file
+//! of the same name, and one line in each `match` below.
+
+use glam::{DMat2, DVec2};
+
+pub use crate::scenario::LensModel;
+
+mod brown_conrady;
+mod fold;
+mod kannala_brandt;
+mod pinhole;
+mod radial_table;
+
+pub use brown_conrady::BrownConrady;
+pub use fold::{FOLD_RAYS, FoldCurve, MAX_FIELD_RAD};
+pub use kannala_brandt::KannalaBrandt;
+pub use pinhole::Pinhole;
+pub use radial_table::{RADIAL_TABLE_LEN, RadialTable};
+
+/// Distorted radius (units of the focal length) that the start table of [`Lens::new`] covers; see [`Lens::with_reach`].
+const DEFAULT_REACH: f64 = 2.0;
+
+/// What can be wrong with lens coefficients.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LensError {
+    /// More coefficients than the model has.
+    #[error("lens.coefficients: model \"{model}\" takes at most {max} coefficients ({names}), but {got} are given: {fix}")]
+    TooManyCoefficients {
+        /// The model's name in files.
+        model: &'static str,
+        /// How many it takes.
+        max: usize,
+        /// Their names, in order.
+        names: &'static str,
+        /// How many there were.
+        got: usize,
+        /// What to do.
+        fix: &'static str,
+    },
+    /// NaN or infinite.
+    #[error("lens.coefficients[{index}] is {value}: every coefficient must be a finite number (use 0 for an unused one)")]
+    NotFinite {
+        /// Position from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A reach that is not a positive finite number.
+    #[error("the lens must reach a positive finite distorted radius, not {0}: check focal_px, principal_point_px and size_px")]
+    Reach(f64),
+}
+
+/// A lens with everything prepared that its inverse needs. Immutable.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lens {
+    /// No distortion.
+    Pinhole(Pinhole),
+    /// Radial (polynomial or rational) and tangential.
+    BrownConrady(Box<BrownConrady>),
+    /// Equidistant fisheye polynomial.
+    KannalaBrandt(Box<KannalaBrandt>),
+}
+
+impl Lens {
+    /// A lens from its model and coefficients: `k1 k2 p1 p2 k3 k4 k5 k6` (Brown-Conrady), `k1 k2 k3 k4` (Kannala-Brandt), none (pinhole);
+    /// trailing zeros may be left out.
+    pub fn new(model: LensModel, coefficients: &[f64]) -> Result<Self, LensError> {
+        Self::with_reach(model, coefficients, DEFAULT_REACH)
+    }
+
+    /// As [`Lens::new`], with the start table of the inverse spread over distorted radii `0..=reach` (units of the focal length) where the
+    /// lens does not fold before. Points farther out are still solved, from a poorer start.
+    pub fn with_reach(model: LensModel, coefficients: &[f64], reach: f64) -> Result<Self, LensError> {
+        if !(reach.is_finite() && reach > 0.0) {
+            return Err(LensError::Reach(reach));
+        }
+        if let Some((index, &value)) = coefficients.iter().enumerate().find(|(_, k)| !k.is_finite()) {
+            return Err(LensError::NotFinite { index, value });
+        }
+        Ok(match model {
+            LensModel::Pinhole => {
+                padded::<0>(coefficients, "pinhole", "none", "leave them out, or set lens.model to the model they belong to")?;
+                Self::Pinhole(Pinhole)
+            }
+            LensModel::BrownConrady => {
+                let fix = "OpenCV's thin-prism and tilt terms are not modelled; leave them out if they are zero, else recalibrate without";
+                let k = padded(coefficients, "brown-conrady", "k1 k2 p1 p2 k3 k4 k5 k6", fix)?;
+                Self::BrownConrady(Box::new(BrownConrady::new(k, reach)))
+            }
+            LensModel::KannalaBrandt => {
+                let k = padded(coefficients, "kannala-brandt", "k1 k2 k3 k4", "leave the others out, or set model = \"brown-conrady\"")?;
+                Self::KannalaBrandt(Box::new(KannalaBrandt::new(k, reach)))
+            }
+        })
+    }
+
+    /// Which model this is.
+    pub fn model(&self) -> LensModel {
+        match self {
+            Self::Pinhole(_) => LensModel::Pinhole,
+            Self::BrownConrady(_) => LensModel::BrownConrady,
+            Self::KannalaBrandt(_) => LensModel::KannalaBrandt,
+        }
+    }
+
+    /// All coefficients in the model's order, zeros included.
+    pub fn coefficients(&self) -> &[f64] {
+        match self {
+            Self::Pinhole(_) => &[],
+            Self::BrownConrady(lens) => &lens.coefficients,
+            Self::KannalaBrandt(lens) => &lens.coefficients,
+        }
+    }
+
+    /// Whether the lens leaves every point where it is: then neither lens map nor lens inverse is needed.
+    pub fn is_identity(&self) -> bool {
+        match self {
+            Self::Pinhole(_) => true,
+            Self::BrownConrady(lens) => lens.coefficients.iter().all(|k| *k == 0.0),
+            Self::KannalaBrandt(_) => false,
+        }
+    }
+
+    /// Forward: ideal to distorted. The bare formula, also beyond the fold; ask [`Lens::contains`] whether the point can be seen.
+    pub fn distort(&self, ideal: DVec2) -> DVec2 {
+        match self {
+            Self::Pinhole(lens) => lens.distort(ideal),
+            Self::BrownConrady(lens) => lens.distort(ideal),
+            Self::KannalaBrandt(lens) => lens.distort(ideal),
+        }
+    }
+
+    /// `d distorted / d ideal`, analytic. Symmetric for every model here.
+    pub fn jacobian(&self, ideal: DVec2) -> DMat2 {
+        match self {
+            Self::Pinhole(lens) => lens.jacobian(ideal),
+            Self::BrownConrady(lens) => lens.jacobian(ideal),
+            Self::KannalaBrandt(lens) => lens.jacobian(ideal),
+        }
+    }
+
+    /// Inverse on the principal branch: the ideal point inside the fold that is imaged at `distorted`, or `None` if there is none
+    /// (also for NaN and infinities).
+    pub fn undistort(&self, distorted: DVec2) -> Option<DVec2> {
+        match self {
+            Self::Pinhole(lens) => lens.undistort(distorted),
+            Self::BrownConrady(lens) => lens.undistort(distorted),
+            Self::KannalaBrandt(lens) => lens.undistort(distorted),
+        }
+    }
+
+    /// Border of the principal branch, or `None` for a model without one.
+    pub fn fold_curve(&self) -> Option<&FoldCurve> {
+        match self {
+            Self::Pinhole(_) => None,
+            Self::BrownConrady(lens) => Some(&lens.fold),
+            Self::KannalaBrandt(lens) => Some(&lens.fold),
+        }
+    }
+
+    /// Start table of the inverse, or `None` for a model without one.
+    pub fn radial_table(&self) -> Option<&RadialTable> {
+        match self {
+            Self::Pinhole(_) => None,
+            Self::BrownConrady(lens) => Some(&lens.table),
+            Self::KannalaBrandt(lens) => Some(&lens.table),
+        }
+    }
+
+    /// A bound on the distorted radius of everything on the principal branch; infinite for a pinhole.
+    pub fn distorted_max(&self) -> f64 {
+        match self {
+            Self::Pinhole(_) => f64::INFINITY,
+            Self::BrownConrady(lens) => lens.fold.distorted_max(),
+            Self::KannalaBrandt(lens) => lens.distorted_max(),
+        }
+    }
+
+    /// Ideal radius of the border of the principal branch in direction `phi` (radians from +u towards +v); infinite for a pinhole.
+    pub fn fold_radius(&self, phi_rad: f64) -> f64 {
+        self.fold_curve().map_or(f64::INFINITY, |fold| fold.radius(phi_rad))
+    }
+
+    /// Whether an ideal point lies on the principal branch, that is, whether `undistort(distort(ideal))` is `ideal`.
+    pub fn contains(&self, ideal: DVec2) -> bool {
+        ideal.is_finite() && ideal.length() < self.fold_radius(ideal.y.atan2(ideal.x))
+    }
+}
+
+/// Coefficients filled up with zeros to the model's count.
+fn padded<const N: usize>(
+    coefficients: &[f64],
+    model: &'static str,
+    names: &'static str,
+    fix: &'static str,
+) -> Result<[f64; N], LensError> {
+    let mut all = [0.0; N];
+    match all.get_mut(..coefficients.len()) {
+        Some(head) => head.copy_from_slice(coefficients),
+        None => return Err(LensError::TooManyCoefficients { model, max: N, names, got: coefficients.len(), fix }),
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,290 @@
-//! (being written)
+//! When each line of the image is exposed: delay, rolling shutter, exposure, interlacing (the paper's section 6).
+//!
+//! Everything is relative to the frame's stamp and to the **mid-exposure** of a line:
+//!
+//! `dt = -delay + ((line + 0.5)/N - 0.5) t_r - (t_i if the row belongs to the earlier field)`
+//!
+//! so that the middle of the image has exactly `-delay`. `line` counts rows from the top or columns from the left; the two reverse
+//! readout directions count from the other end. Fields are always rows, whatever the readout direction.
+
+use crate::scenario::{FieldOr, Parity, Readout, ShutterSpec};
+
+/// What can be wrong with `[camera.shutter]`.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShutterError {
+    /// Negative, NaN or infinite time.
+    #[error("camera.shutter.{key} is {value}: it must be a finite number of milliseconds, 0 or more{hint}")]
+    Time {
+        /// Key in `[camera.shutter]`.
+        key: &'static str,
+        /// The value.
+        value: f64,
+        /// What a negative value may have meant.
+        hint: &'static str,
+    },
+    /// Not a frame rate.
+    #[error("camera.fps is {0}: it must be a positive finite number of frames a second")]
+    Fps(f64),
+    /// An image without pixels.
+    #[error("camera.size_px is [{0}, {1}]: both must be at least 1")]
+    Size(u32, u32),
+}
+
+/// What a line of the readout is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LinesAxis {
+    /// Lines are rows: a pixel's time depends on its y alone.
+    Rows,
+    /// Lines are columns: a pixel's time depends on its x, and on the parity of its y where fields are interlaced.
+    Columns,
+}
+
+/// Timing of one frame's pixels relative to its stamp, checked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shutter {
+    size_px: [u32; 2],
+    delay_s: f64,
+    readout_s: f64,
+    direction: Readout,
+    exposure_s: f64,
+    interlace_s: f64,
+    first_field: Parity,
+}
+
+impl Shutter {
+    /// From `[camera.shutter]`; N is the height or the width of the image, by the direction of the readout.
+    pub fn from_spec(spec: &ShutterSpec, fps: f64, size_px: [u32; 2]) -> Result<Self, ShutterError> {
+        if !(fps.is_normal() && fps > 0.0) {
+            return Err(ShutterError::Fps(fps));
+        }
+        if size_px.contains(&0) {
+            return Err(ShutterError::Size(size_px[0], size_px[1]));
+        }
+        let interlace_ms = match spec.interlace_ms {
+            FieldOr::Field => 500.0 / fps,
+            FieldOr::Ms(ms) => ms,
+        };
+        Ok(Self {
+            size_px,
+            delay_s: seconds("delay_ms", spec.delay_ms, "; it says how much older than its stamp the image is")?,
+            readout_s: seconds("readout_ms", spec.readout_ms, "; for a reverse readout set camera.shutter.readout")?,
+            direction: spec.readout,
+            exposure_s: seconds("exposure_ms", spec.exposure_ms, "")?,
+            interlace_s: seconds("interlace_ms", interlace_ms, "; to exchange the fields set camera.shutter.first_field")?,
+            first_field: spec.first_field,
+        })
+    }
+
+    /// Whether lines are rows or columns.
+    pub fn lines_axis(&self) -> LinesAxis {
+        match self.direction {
+            Readout::TopToBottom | Readout::BottomToTop => LinesAxis::Rows,
+            Readout::LeftToRight | Readout::RightToLeft => LinesAxis::Columns,
+        }
+    }
+
+    /// N: rows or columns, by the direction of the readout.
+    pub fn lines(&self) -> u32 {
+        match self.lines_axis() {
+            LinesAxis::Rows => self.size_px[1],
+            LinesAxis::Columns => self.size_px[0],
+        }
+    }
+
+    /// Mid-exposure of a line relative to the stamp, seconds. Rows include their field's lag; columns are those of the later field
+    /// (see [`Shutter::dt_pixel_s`]).
+    pub fn dt_line_s(&self, line: u32) -> f64 {
+        let dt_s = self.dt_readout_s(line);
+        match self.lines_axis() {
+            LinesAxis::Rows => dt_s - self.field_lag_s(line),
+            LinesAxis::Columns => dt_s,
+        }
+    }
+
+    /// Mid-exposure of a pixel relative to the stamp, seconds.
+    pub fn dt_pixel_s(&self, x: u32, y: u32) -> f64 {
+        let line = match self.lines_axis() {
+            LinesAxis::Rows => y,
+            LinesAxis::Columns => x,
+        };
+        self.dt_readout_s(line) - self.field_lag_s(y)
+    }
+
+    /// By how much a row is earlier than the readout alone says: the interlacing lag for rows of the first field, else 0.
+    pub fn field_lag_s(&self, row: u32) -> f64 {
+        let parity = if row.is_multiple_of(2) { Parity::Even } else { Parity::Odd };
+        if parity == self.first_field { self.interlace_s } else { 0.0 }
+    }
+
+    /// Earliest begin and latest end of exposure of any pixel, relative to the stamp.
+    pub fn window_s(&self) -> (f64, f64) {
+        let last = self.lines() - 1;
+        // With one row only one field exists; with more, both do. For rows, the extreme lines of each field are among the outer two.
+        let rows = self.size_px[1];
+        let mids = [0, 1.min(last), last.saturating_sub(1), last].into_iter().flat_map(|line| {
+            let ys = match self.lines_axis() {
+                LinesAxis::Rows => [line, line],
+                LinesAxis::Columns => [0, 1.min(rows - 1)],
+            };
+            ys.map(|y| self.dt_readout_s(line) - self.field_lag_s(y))
+        });
+        let (min, max) = mids.fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), dt_s| (min.min(dt_s), max.max(dt_s)));
+        (min - 0.5 * self.exposure_s, max + 0.5 * self.exposure_s)
+    }
+
+    /// How much older than its stamp the image centre is (-t_d), seconds.
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
+    }
+
+    /// Readout time t_r, seconds.
+    pub fn readout_s(&self) -> f64 {
+        self.readout_s
+    }
+
+    /// Exposure t_e, seconds, centred on a line's mid-exposure.
+    pub fn exposure_s(&self) -> f64 {
+        self.exposure_s
+    }
+
+    /// Lag between the fields t_i, seconds.
+    pub fn interlace_s(&self) -> f64 {
+        self.interlace_s
+    }
+
+    /// Parity (0-based) of the rows of the earlier field.
+    pub fn first_field(&self) -> Parity {
+        self.first_field
+    }
+
+    /// Direction of the readout.
+    pub fn direction(&self) -> Readout {
+        self.direction
+    }
+
+    /// Whether all pixels have one time (the delay): no rolling shutter, no interlacing.
+    pub fn is_global(&self) -> bool {
+        self.readout_s == 0.0 && self.interlace_s == 0.0
+    }
+
+    fn dt_readout_s(&self, line: u32) -> f64 {
+        let position = (f64::from(line) + 0.5) / f64::from(self.lines()) - 0.5;
+        let share = match self.direction {
+            Readout::TopToBottom | Readout::LeftToRight => position,
+            Readout::BottomToTop | Readout::RightToLeft => -position,
+        };
+        share * self.readout_s - self.delay_s
+    }
+}
+
+fn seconds(key: &'static str, ms: f64, hint: &'static str) -> Result<f64, ShutterError> {
+    if ms.is_finite() && ms >= 0.0 { Ok(1e-3 * ms) } else { Err(ShutterError::Time { key, value: ms, hint }) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn spec() -> ShutterSpec {
+        ShutterSpec { delay_ms: 5.0, readout_ms: 33.0, exposure_ms: 8.0, ..ShutterSpec::default() }
+    }
+
+    /// Window by visiting every pixel.
+    fn window_by_pixels(shutter: &Shutter, [width, height]: [u32; 2]) -> (f64, f64) {
+        let mut window = (f64::INFINITY, f64::NEG_INFINITY);
+        for y in 0..height {
+            for x in 0..width {
+                let dt_s = shutter.dt_pixel_s(x, y);
+                window = (window.0.min(dt_s - 0.5 * shutter.exposure_s()), window.1.max(dt_s + 0.5 * shutter.exposure_s()));
+            }
+        }
+        window
+    }
+
+    #[test]
+    fn the_image_centre_has_exactly_the_delay() {
+        // 5 rows: row 2 is the centre.
+        let shutter = Shutter::from_spec(&spec(), 30.0, [7, 5]).unwrap();
+        assert_eq!(shutter.dt_line_s(2), -0.005);
+        assert_eq!(shutter.dt_line_s(0), -0.005 + 0.033 * (0.1 - 0.5));
+        assert_eq!(shutter.dt_line_s(4), -0.005 + 0.033 * (0.9 - 0.5));
+        // Both halves of an even image are symmetric about it.
+        let even = Shutter::from_spec(&spec(), 30.0, [640, 480]).unwrap();
+        assert!((0.5 * (even.dt_line_s(0) + even.dt_line_s(479)) + 0.005).abs() < 1e-15);
+        assert!((even.dt_line_s(479) - even.dt_line_s(0) - 0.033 * 479.0 / 480.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_other_directions_mirror_the_first() {
+        let with = |readout| Shutter::from_spec(&ShutterSpec { readout, ..spec() }, 30.0, [6, 4]).unwrap();
+        let (down, up) = (with(Readout::TopToBottom), with(Readout::BottomToTop));
+        let (right, left) = (with(Readout::LeftToRight), with(Readout::RightToLeft));
+        for i in 0..4 {
+            assert!((down.dt_line_s(i) - up.dt_line_s(3 - i)).abs() < 1e-15);
+        }
+        for i in 0..6 {
+            assert!((right.dt_line_s(i) - left.dt_line_s(5 - i)).abs() < 1e-15);
+            assert_eq!(right.dt_pixel_s(i, 3), right.dt_line_s(i));
+        }
+        assert!(right.dt_line_s(0) < right.dt_line_s(5));
+        assert_eq!((down.lines(), right.lines()), (4, 6));
+        assert_eq!((down.lines_axis(), left.lines_axis()), (LinesAxis::Rows, LinesAxis::Columns));
+    }
+
+    #[test]
+    fn even_rows_are_earlier_by_the_interlacing_lag() {
+        let interlaced = ShutterSpec { interlace_ms: FieldOr::Field, ..spec() };
+        let plain = Shutter::from_spec(&spec(), 25.0, [4, 6]).unwrap();
+        let shutter = Shutter::from_spec(&interlaced, 25.0, [4, 6]).unwrap();
+        assert_eq!(shutter.interlace_s(), 0.02);
+        for row in 0..6 {
+            let lag_s = plain.dt_line_s(row) - shutter.dt_line_s(row);
+            assert!((lag_s - if row % 2 == 0 { 0.02 } else { 0.0 }).abs() < 1e-15);
+        }
+        let odd = Shutter::from_spec(&ShutterSpec { first_field: Parity::Odd, ..interlaced.clone() }, 25.0, [4, 6]).unwrap();
+        assert_eq!(odd.dt_line_s(0), plain.dt_line_s(0));
+        assert!((odd.dt_line_s(1) - plain.dt_line_s(1) + 0.02).abs() < 1e-15);
+        // Sideways readout: still rows.
+        let sideways = Shutter::from_spec(&ShutterSpec { readout: Readout::LeftToRight, ..interlaced }, 25.0, [4, 6]).unwrap();
+        assert!((sideways.dt_pixel_s(1, 1) - sideways.dt_pixel_s(1, 2) - 0.02).abs() < 1e-15);
+        assert_eq!(sideways.dt_pixel_s(1, 1), sideways.dt_line_s(1));
+    }
+
+    #[test]
+    fn the_window_is_that_of_all_pixels() {
+        for readout in [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft] {
+            for first_field in [Parity::Even, Parity::Odd] {
+                for interlace_ms in [0.0, 1.0, 20.0, 100.0] {
+                    for size in [[1, 1], [1, 2], [2, 1], [5, 3], [4, 6]] {
+                        let spec = ShutterSpec { readout, first_field, interlace_ms: FieldOr::Ms(interlace_ms), ..spec() };
+                        let shutter = Shutter::from_spec(&spec, 30.0, size).unwrap();
+                        assert_eq!(shutter.window_s(), window_by_pixels(&shutter, size), "{spec:?} {size:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_on_is_an_instant() {
+        let shutter = Shutter::from_spec(&ShutterSpec::default(), 30.0, [640, 480]).unwrap();
+        assert!(shutter.is_global());
+        assert_eq!(shutter.window_s(), (0.0, 0.0));
+    }
+
+    #[test]
+    fn bad_times_are_named() {
+        for bad in [-1.0, f64::NAN, f64::INFINITY] {
+            let error = |spec: ShutterSpec| Shutter::from_spec(&spec, 30.0, [4, 4]).unwrap_err().to_string();
+            assert!(error(ShutterSpec { delay_ms: bad, ..spec() }).contains("delay_ms"));
+            assert!(error(ShutterSpec { readout_ms: bad, ..spec() }).contains("readout_ms"));
+            assert!(error(ShutterSpec { exposure_ms: bad, ..spec() }).contains("exposure_ms"));
+            assert!(error(ShutterSpec { interlace_ms: FieldOr::Ms(bad), ..spec() }).contains("interlace_ms"));
+            assert!(Shutter::from_spec(&spec(), bad, [4, 4]).is_err());
+        }
+        assert!(Shutter::from_spec(&spec(), 0.0, [4, 4]).is_err());
+        assert!(Shutter::from_spec(&spec(), 30.0, [0, 4]).is_err());
+    }
+}

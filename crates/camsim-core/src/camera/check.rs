@@ -1,0 +1,106 @@
+//! What a calibration is worth: where it folds and how much of the image it explains.
+
+use glam::DVec2;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::CameraModel;
+use crate::lens::{FOLD_RAYS, Lens};
+
+/// Pixels that a check looks at, about; larger images are sampled on a regular grid that includes the borders.
+const MAX_SAMPLES: f64 = 250_000.0;
+
+/// Grid over the image on which the branch is tested for being one-to-one.
+const BIJECTIVITY_GRID: u32 = 33;
+
+/// Report of [`CameraModel::check`] (`camsim lens CAMERA.toml check --json`).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LensCheck {
+    /// Share of the pixels that have an ideal ray.
+    pub valid_fraction: f64,
+    /// Smallest ideal radius `|(u, v)|` at which the model folds or has a pole; `None` if it does neither within 89 degrees.
+    pub fold_radius_min: Option<f64>,
+    /// The largest such radius over all directions.
+    pub fold_radius_max: Option<f64>,
+    /// Largest `|project(unproject(p)) - p|` over valid pixels.
+    pub worst_roundtrip_px: f64,
+    /// Whether no pixel has two ideal rays on the principal branch.
+    pub bijective: bool,
+}
+
+impl CameraModel {
+    /// Checks lens and intrinsics over the image.
+    pub fn check(&self) -> LensCheck {
+        let [width, height] = self.size_px;
+        let area = f64::from(width) * f64::from(height);
+        let stride = (area / MAX_SAMPLES).sqrt().max(1.0);
+        let (xs, ys) = (samples(width, stride), samples(height, stride));
+        let (valid, worst_roundtrip_px) = ys
+            .par_iter()
+            .map(|&y| {
+                xs.iter().fold((0_usize, 0.0_f64), |(valid, worst), &x| {
+                    let pixel = DVec2::new(x, y);
+                    match self.unproject(pixel) {
+                        Some(ideal) => (valid + 1, worst.max((self.project(ideal) - pixel).length())),
+                        None => (valid, worst),
+                    }
+                })
+            })
+            .reduce(|| (0, 0.0), |a, b| (a.0 + b.0, a.1.max(b.1)));
+        let fold = self.lens.fold_curve().filter(|fold| fold.folds()).map(|fold| fold.range());
+        LensCheck {
+            valid_fraction: valid as f64 / (xs.len() * ys.len()) as f64,
+            fold_radius_min: fold.map(|(min, _)| min),
+            fold_radius_max: fold.map(|(_, max)| max),
+            worst_roundtrip_px,
+            bijective: self.is_bijective(),
+        }
+    }
+
+    /// On the branch the determinant is positive, so a distorted point has as many pre-images as the border's image winds round it.
+    fn is_bijective(&self) -> bool {
+        let Some(border) = distorted_border(&self.lens) else { return true };
+        let [width, height] = self.size_px.map(|size| f64::from(size - 1) / f64::from(BIJECTIVITY_GRID - 1));
+        let cells = BIJECTIVITY_GRID * BIJECTIVITY_GRID;
+        (0..cells).into_par_iter().all(|cell| {
+            let (column, row) = (cell % BIJECTIVITY_GRID, cell / BIJECTIVITY_GRID);
+            let pixel = DVec2::new(f64::from(column) * width, f64::from(row) * height);
+            winding_number(&border, self.distorted_from_pixel(pixel)) <= 1
+        })
+    }
+}
+
+/// Image of the fold curve, slightly inside of it (a pole itself has no image); `None` where the lens has no fold curve.
+fn distorted_border(lens: &Lens) -> Option<Vec<DVec2>> {
+    let radii = lens.fold_curve()?.radii();
+    let ray = |(i, radius): (usize, &f64)| {
+        let direction = DVec2::from_angle(i as f64 * std::f64::consts::TAU / FOLD_RAYS as f64);
+        lens.distort(direction * (radius * (1.0 - 1e-9)))
+    };
+    Some(radii.iter().enumerate().map(ray).collect())
+}
+
+/// How often a closed polygon turns round a point, anticlockwise positive.
+fn winding_number(polygon: &[DVec2], point: DVec2) -> i32 {
+    polygon
+        .iter()
+        .zip(polygon.iter().cycle().skip(1))
+        .map(|(a, b)| {
+            let left = (*b - *a).perp_dot(point - *a);
+            if a.y <= point.y && b.y > point.y && left > 0.0 {
+                1
+            } else if a.y > point.y && b.y <= point.y && left < 0.0 {
+                -1
+            } else {
+                0
+            }
+        })
+        .sum()
+}
+
+/// Pixel coordinates `0, ..., size - 1`, about `stride` apart.
+fn samples(size: u32, stride: f64) -> Vec<f64> {
+    let last = f64::from(size - 1);
+    let count = (last / stride).round().max(1.0).min(last.max(1.0));
+    if size == 1 { vec![0.0] } else { (0..=count as u32).map(|i| f64::from(i) * last / count).collect() }
+}

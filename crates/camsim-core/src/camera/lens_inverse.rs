@@ -1,0 +1,23 @@
+//! The lens map on the CPU: twin of the GPU stage `lens_inverse`.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::CameraModel;
+
+/// `u = v = INVALID_UV` marks a pixel of a lens map that has no ideal ray. Finite, because shaders may assume that infinities do not occur.
+pub const INVALID_UV: f32 = 1e30;
+
+impl CameraModel {
+    /// Ideal `[u, v]` of every pixel's centre, row-major, solved in f64; [`INVALID_UV`] twice where there is none.
+    pub fn lens_inverse(&self) -> Vec<[f32; 2]> {
+        let [width, height] = self.size_px;
+        let row = |y: u32| {
+            (0..width).map(move |x| {
+                let ideal = self.unproject(DVec2::new(f64::from(x), f64::from(y)));
+                ideal.map_or([INVALID_UV; 2], |ideal| ideal.as_vec2().to_array())
+            })
+        };
+        (0..height).into_par_iter().flat_map_iter(row).collect()
+    }
+}

@@ -1,0 +1,98 @@
+#![allow(clippy::unwrap_used)]
+
+use glam::DVec2;
+
+use super::*;
+use crate::scenario::{LensSpec, ZoomSpec};
+
+fn s3_opencv() -> CameraModel {
+    let k = [-0.428129, 0.158059, 0.000245, -0.002286, -0.029194];
+    CameraModel::new([640, 480], [307.960654; 2], Some([298.485405, 226.525456]), LensModel::BrownConrady, &k).unwrap()
+}
+
+#[test]
+fn the_centre_of_the_image_is_between_the_middle_pixels() {
+    let camera = CameraModel::from_spec(&CameraSpec::default()).unwrap();
+    assert_eq!(camera.principal_point_px, DVec2::new(319.5, 239.5));
+    assert_eq!(camera.unproject(DVec2::new(319.5, 239.5)).unwrap(), DVec2::ZERO);
+    assert_eq!(camera.project(DVec2::new(1.0, 0.0)), DVec2::new(819.5, 239.5));
+}
+
+#[test]
+fn a_fisheye_by_a_polynomial_explains_little_more_than_half_of_its_image() {
+    let report = s3_opencv().check();
+    // 43 % of the frame lies beyond the fold: 236 px from the principal point.
+    assert!((report.valid_fraction - 0.57).abs() < 0.005, "{report:?}");
+    let (min, max) = (report.fold_radius_min.unwrap(), report.fold_radius_max.unwrap());
+    assert!(min > 1.3 && min < 1.386 && max > 1.386 && max < 1.5, "{report:?}");
+    assert!(report.worst_roundtrip_px < 1e-6, "{report:?}");
+    assert!(report.bijective);
+}
+
+#[test]
+fn checks_of_harmless_cameras_are_clean() {
+    let pinhole = CameraModel::from_spec(&CameraSpec::default()).unwrap().check();
+    assert_eq!((pinhole.valid_fraction, pinhole.fold_radius_min, pinhole.bijective), (1.0, None, true));
+    let k = [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05];
+    let euroc = CameraModel::new([752, 480], [458.654, 457.296], Some([367.215, 248.375]), LensModel::BrownConrady, &k).unwrap().check();
+    assert_eq!(euroc.valid_fraction, 1.0);
+    assert!(euroc.worst_roundtrip_px < 1e-6 && euroc.bijective);
+    // One pixel, and a strip.
+    for size in [[1, 1], [1, 300], [9000, 1]] {
+        let report = CameraModel::new(size, [300.0; 2], None, LensModel::Pinhole, &[]).unwrap().check();
+        assert_eq!(report.valid_fraction, 1.0);
+    }
+}
+
+#[test]
+fn bad_cameras_are_named() {
+    let base = CameraSpec::default();
+    let error = |spec: CameraSpec| CameraModel::from_spec(&spec).unwrap_err().to_string();
+    assert!(error(CameraSpec { size_px: [0, 480], ..base.clone() }).contains("size_px"));
+    for bad in [0.0, -500.0, f64::NAN, f64::INFINITY, 1e-310] {
+        assert!(error(CameraSpec { focal_px: [500.0, bad], ..base.clone() }).contains("focal_px"));
+    }
+    assert!(error(CameraSpec { principal_point_px: Some([f64::NAN, 0.0]), ..base.clone() }).contains("principal_point_px"));
+    let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![f64::NAN] };
+    assert!(error(CameraSpec { lens, ..base.clone() }).contains("coefficients[0]"));
+    let huge = CameraSpec { focal_px: [1e-300, 1e-300], ..base };
+    assert!(CameraModel::from_spec(&huge).is_err());
+}
+
+fn zoom_camera() -> CameraSpec {
+    let entry = |at: f64, focal: f64, k1: f64| ZoomSpec { at, focal_px: [focal; 2], principal_point_px: None, coefficients: vec![k1] };
+    CameraSpec {
+        lens: LensSpec { model: LensModel::BrownConrady, coefficients: vec![] },
+        zoom: vec![entry(1.0, 400.0, -0.3), entry(2.0, 800.0, -0.1), entry(4.0, 1600.0, 0.0)],
+        ..CameraSpec::default()
+    }
+}
+
+#[test]
+fn zoom_interpolates_its_table_and_holds_outside() {
+    let spec = zoom_camera();
+    let at = |zoom: f64| {
+        let camera = CameraModel::at_zoom(&spec, zoom).unwrap();
+        (camera.focal_px.x, camera.lens.coefficients()[0])
+    };
+    let close = |(f, k): (f64, f64), (f2, k2): (f64, f64)| (f - f2).abs() < 1e-9 && (k - k2).abs() < 1e-12;
+    assert!(close(at(1.0), (400.0, -0.3)) && close(at(2.0), (800.0, -0.1)) && close(at(4.0), (1600.0, 0.0)));
+    assert!(close(at(1.5), (600.0, -0.2)) && close(at(3.0), (1200.0, -0.05)));
+    assert!(close(at(-7.0), (400.0, -0.3)) && close(at(f64::INFINITY), (1600.0, 0.0)));
+    assert!(matches!(CameraModel::at_zoom(&spec, f64::NAN), Err(CameraError::ZoomValue(_))));
+    let table = ZoomTable::from_spec(&spec).unwrap().unwrap();
+    assert_eq!([0.0, 1.4, 1.5, 1.6, 2.9, 3.1, 9.0].map(|zoom| table.nearest(zoom)), [0, 0, 0, 1, 1, 2, 2]);
+}
+
+#[test]
+fn a_zoom_table_must_ascend() {
+    let mut spec = zoom_camera();
+    spec.zoom[1].at = 1.0;
+    assert!(matches!(ZoomTable::from_spec(&spec), Err(CameraError::ZoomOrder { index: 1, .. })));
+    spec.zoom[1].at = f64::NAN;
+    assert!(ZoomTable::from_spec(&spec).is_err());
+    let mut spec = zoom_camera();
+    spec.zoom[2].focal_px = [0.0; 2];
+    assert!(ZoomTable::from_spec(&spec).unwrap_err().to_string().contains("camera.zoom[2].focal_px"));
+    assert_eq!(ZoomTable::from_spec(&CameraSpec::default()).unwrap(), None);
+}

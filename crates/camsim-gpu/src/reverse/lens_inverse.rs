@@ -1,0 +1,303 @@
+//! lens_inverse: pixel -> ideal ray, as a **lens map** that is computed once per lens and zoom value.
+//!
+//! Reads intrinsics, coefficients and the f64 fold curve and start table of [`Lens`]; writes one `rg32float` texel per pixel: ideal
+//! `(u, v)` of the pixel's centre, or [`INVALID_UV`] twice. CPU twin: [`CameraModel::lens_inverse`].
+
+use bytemuck::{Pod, Zeroable};
+use camsim_core::camera::CameraModel;
+pub use camsim_core::camera::INVALID_UV;
+use camsim_core::lens::{Lens, LensModel};
+use glam::DVec2;
+use wgpu::util::DeviceExt;
+
+/// Texel format of a lens map. Half precision would cost 0.3 px.
+pub const LENS_MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
+
+/// Edge of the square workgroups.
+const WORKGROUP_PX: u32 = 8;
+
+/// Where the inverse starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Start {
+    /// From the lens's own table.
+    Cold,
+    /// From the lens map of a nearby zoom value.
+    Warm,
+}
+
+/// Every variant of the stage, in the order of [`LensInversePass`]'s pipelines. A pinhole has nothing to start from.
+pub const VARIANTS: [(LensModel, Start); 5] = [
+    (LensModel::Pinhole, Start::Cold),
+    (LensModel::BrownConrady, Start::Cold),
+    (LensModel::BrownConrady, Start::Warm),
+    (LensModel::KannalaBrandt, Start::Cold),
+    (LensModel::KannalaBrandt, Start::Warm),
+];
+
+/// Mirror of `LensUniform` in shaders/reverse/lens_inverse/lens.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+struct LensUniform {
+    size_px: [u32; 2],
+    focal_px: [f32; 2],
+    principal_point_whole_px: [i32; 2],
+    principal_point_fraction_px: [f32; 2],
+    radial: [f32; 4],
+    rational: [f32; 4],
+    tangential: [f32; 2],
+    distorted_max: f32,
+    table_distorted_max: f32,
+    theta_max: f32,
+    padding: [f32; 3],
+}
+
+impl LensUniform {
+    fn new(camera: &CameraModel) -> Self {
+        // Clamped so that the integer difference to a pixel cannot overflow; so far out every pixel is invalid or meaningless anyway.
+        let whole = camera.principal_point_px.round().clamp(DVec2::splat(-1e9), DVec2::splat(1e9));
+        let mut uniform = Self {
+            size_px: camera.size_px,
+            focal_px: camera.focal_px.as_vec2().to_array(),
+            principal_point_whole_px: whole.as_ivec2().to_array(),
+            principal_point_fraction_px: (camera.principal_point_px - whole).as_vec2().to_array(),
+            radial: [0.0; 4],
+            rational: [0.0; 4],
+            tangential: [0.0; 2],
+            distorted_max: finite_f32(camera.lens.distorted_max()),
+            table_distorted_max: camera.lens.radial_table().map_or(1.0, |table| finite_f32(table.distorted_max())),
+            theta_max: 0.0,
+            padding: [0.0; 3],
+        };
+        match &camera.lens {
+            Lens::Pinhole(_) => {}
+            Lens::BrownConrady(_) => {
+                if let [k1, k2, p1, p2, k3, k4, k5, k6] = *camera.lens.coefficients() {
+                    uniform.radial = [k1, k2, k3, 0.0].map(finite_f32);
+                    uniform.rational = [k4, k5, k6, 0.0].map(finite_f32);
+                    uniform.tangential = [p1, p2].map(finite_f32);
+                }
+            }
+            Lens::KannalaBrandt(lens) => {
+                if let [k1, k2, k3, k4] = *camera.lens.coefficients() {
+                    uniform.radial = [k1, k2, k3, k4].map(finite_f32);
+                }
+                uniform.theta_max = lens.theta_max_rad() as f32;
+            }
+        }
+        uniform
+    }
+}
+
+/// Nearest f32 that a shader may compute with.
+fn finite_f32(value: f64) -> f32 {
+    value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
+}
+
+/// Fold radii, then start ratios; empty for a pinhole.
+fn lens_table(lens: &Lens) -> Vec<f32> {
+    let fold = lens.fold_curve().map_or(&[][..], |fold| fold.radii());
+    let ratios = lens.radial_table().map_or(&[][..], |table| table.ratios());
+    fold.iter().chain(ratios).map(|value| finite_f32(*value)).collect()
+}
+
+/// WGSL of one variant.
+pub fn shader_source(model: LensModel, start: Start) -> String {
+    let [table, formula] = match model {
+        LensModel::Pinhole => ["", include_str!("../../../../shaders/reverse/lens_inverse/pinhole.wgsl")],
+        LensModel::BrownConrady => [
+            include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
+            include_str!("../../../../shaders/reverse/lens_inverse/brown_conrady.wgsl"),
+        ],
+        LensModel::KannalaBrandt => [
+            include_str!("../../../../shaders/reverse/lens_inverse/table.wgsl"),
+            include_str!("../../../../shaders/reverse/lens_inverse/kannala_brandt.wgsl"),
+        ],
+    };
+    let start = match start {
+        Start::Cold => include_str!("../../../../shaders/reverse/lens_inverse/start_cold.wgsl"),
+        Start::Warm => include_str!("../../../../shaders/reverse/lens_inverse/start_warm.wgsl"),
+    };
+    let common = include_str!("../../../../shaders/reverse/lens_inverse/lens.wgsl");
+    let main = include_str!("../../../../shaders/reverse/lens_inverse/main.wgsl");
+    [common, table, formula, start, main].concat()
+}
+
+/// The pipelines of all variants.
+#[derive(Debug)]
+pub struct LensInversePass {
+    pipelines: [wgpu::ComputePipeline; VARIANTS.len()],
+}
+
+impl LensInversePass {
+    /// Compiles every variant.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let pipelines = VARIANTS.map(|(model, start)| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("camsim.lens_inverse"),
+                source: wgpu::ShaderSource::Wgsl(shader_source(model, start).into()),
+            });
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some("camsim.lens_inverse"),
+                layout: Some(&pipeline_layout(device, model, start)),
+                module: &module,
+                entry_point: Some("lens_inverse"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            })
+        });
+        Self { pipelines }
+    }
+
+    /// An empty lens map for a camera: written by this stage, then sampled, copied, or given as `warm`.
+    pub fn create_map(device: &wgpu::Device, size_px: [u32; 2]) -> wgpu::Texture {
+        device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("camsim.lens_inverse.map"),
+            size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: LENS_MAP_FORMAT,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        })
+    }
+
+    /// Records the pass that writes the lens map of `camera` to `target` ([`LENS_MAP_FORMAT`], the camera's size). `warm`, the map of a
+    /// camera of the same size and nearby zoom, only shortens the way to the same solution: keep it a pure function of scenario and frame
+    /// (a zoom table entry's map, never the previous frame's).
+    pub fn encode(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        camera: &CameraModel,
+        target: &wgpu::TextureView,
+        warm: Option<&wgpu::TextureView>,
+    ) {
+        let model = camera.lens.model();
+        let warm = warm.filter(|_| model != LensModel::Pinhole);
+        let pipeline = match (model, warm.is_some()) {
+            (LensModel::Pinhole, _) => &self.pipelines[0],
+            (LensModel::BrownConrady, false) => &self.pipelines[1],
+            (LensModel::BrownConrady, true) => &self.pipelines[2],
+            (LensModel::KannalaBrandt, false) => &self.pipelines[3],
+            (LensModel::KannalaBrandt, true) => &self.pipelines[4],
+        };
+        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("camsim.lens_inverse.lens"),
+            contents: bytemuck::bytes_of(&LensUniform::new(camera)),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        let table = lens_table(&camera.lens);
+        let table = (!table.is_empty()).then(|| {
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("camsim.lens_inverse.table"),
+                contents: bytemuck::cast_slice(&table),
+                usage: wgpu::BufferUsages::STORAGE,
+            })
+        });
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let mut entries = vec![entry(0, uniform.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(target))];
+        entries.extend(table.as_ref().map(|table| entry(1, table.as_entire_binding())));
+        entries.extend(warm.map(|warm| entry(3, wgpu::BindingResource::TextureView(warm))));
+        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("camsim.lens_inverse"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("lens_inverse"), timestamp_writes: None });
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &bind_group, &[]);
+        let [width, height] = camera.size_px;
+        pass.dispatch_workgroups(width.div_ceil(WORKGROUP_PX), height.div_ceil(WORKGROUP_PX), 1);
+    }
+}
+
+/// Explicit, because float32 textures are not filterable and a derived layout would ask for a filterable one.
+fn pipeline_layout(device: &wgpu::Device, model: LensModel, start: Start) -> wgpu::PipelineLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let mut entries = vec![
+        entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+        entry(
+            2,
+            wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::WriteOnly,
+                format: LENS_MAP_FORMAT,
+                view_dimension: wgpu::TextureViewDimension::D2,
+            },
+        ),
+    ];
+    if model != LensModel::Pinhole {
+        entries.push(entry(1, buffer(wgpu::BufferBindingType::Storage { read_only: true })));
+    }
+    if start == Start::Warm {
+        entries.push(entry(
+            3,
+            wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+        ));
+    }
+    let layout =
+        device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.lens_inverse"), entries: &entries });
+    device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("camsim.lens_inverse"),
+        bind_group_layouts: &[Some(&layout)],
+        immediate_size: 0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::mem::{offset_of, size_of};
+
+    use super::*;
+
+    fn parsed(model: LensModel, start: Start) -> naga::Module {
+        let source = shader_source(model, start);
+        naga::front::wgsl::parse_str(&source).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&source)))
+    }
+
+    #[test]
+    fn every_variant_is_valid_without_any_capability() {
+        for (model, start) in VARIANTS {
+            let module = parsed(model, start);
+            let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+            validator.validate(&module).unwrap_or_else(|error| panic!("{model:?} {start:?}: {error:?}"));
+        }
+    }
+
+    #[test]
+    fn the_uniform_is_laid_out_as_in_the_shader() {
+        let module = parsed(LensModel::BrownConrady, Start::Cold);
+        let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("LensUniform")).unwrap();
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("LensUniform is not a struct") };
+        let offsets: Vec<_> = members.iter().map(|member| (member.name.as_deref().unwrap(), member.offset as usize)).collect();
+        let mirror = [
+            ("size_px", offset_of!(LensUniform, size_px)),
+            ("focal_px", offset_of!(LensUniform, focal_px)),
+            ("principal_point_whole_px", offset_of!(LensUniform, principal_point_whole_px)),
+            ("principal_point_fraction_px", offset_of!(LensUniform, principal_point_fraction_px)),
+            ("radial", offset_of!(LensUniform, radial)),
+            ("rational", offset_of!(LensUniform, rational)),
+            ("tangential", offset_of!(LensUniform, tangential)),
+            ("distorted_max", offset_of!(LensUniform, distorted_max)),
+            ("table_distorted_max", offset_of!(LensUniform, table_distorted_max)),
+            ("theta_max", offset_of!(LensUniform, theta_max)),
+        ];
+        assert_eq!(offsets, mirror);
+        assert_eq!(*span as usize, size_of::<LensUniform>());
+    }
+
+    #[test]
+    fn the_shaders_constants_are_those_of_the_core() {
+        let source = shader_source(LensModel::BrownConrady, Start::Cold);
+        assert!(source.contains(&format!("const FOLD_RAYS: u32 = {}u;", camsim_core::lens::FOLD_RAYS)));
+        assert!(source.contains(&format!("const RADIAL_TABLE_LEN: u32 = {}u;", camsim_core::lens::RADIAL_TABLE_LEN)));
+        assert!(source.contains(&format!("const INVALID_UV: f32 = {INVALID_UV:e};")));
+    }
+}

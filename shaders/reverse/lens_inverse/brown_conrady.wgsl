@@ -1,0 +1,100 @@
+// Brown-Conrady, polynomial or rational, with tangential terms (paper eqs. 8 and 9). Twin: lens/brown_conrady.rs.
+
+// Starts are kept this far inside the fold, where the Jacobian is safely regular.
+const START_SHARE_OF_FOLD: f32 = 0.95;
+const MIN_DETERMINANT: f32 = 1e-4;
+const MAX_HALVINGS: i32 = 6;
+
+fn numerator(r2: f32) -> f32 {
+    let k = lens.radial;
+    return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
+}
+
+fn denominator(r2: f32) -> f32 {
+    let k = lens.rational;
+    return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
+}
+
+fn distort(ideal: vec2f) -> vec2f {
+    let r2 = dot(ideal, ideal);
+    let d = numerator(r2) / denominator(r2);
+    let p = lens.tangential;
+    let uv2 = 2.0 * ideal.x * ideal.y;
+    return ideal * d + p.xy * uv2 + p.yx * (r2 + 2.0 * ideal * ideal);
+}
+
+// a, b, c of the symmetric Jacobian [[a, b], [b, c]].
+fn jacobian(ideal: vec2f) -> vec3f {
+    let r2 = dot(ideal, ideal);
+    let below = denominator(r2);
+    let d = numerator(r2) / below;
+    let n = lens.radial;
+    let q = lens.rational;
+    let numerator_slope = n.x + r2 * (2.0 * n.y + r2 * 3.0 * n.z);
+    let denominator_slope = q.x + r2 * (2.0 * q.y + r2 * 3.0 * q.z);
+    let s = 2.0 * (numerator_slope - denominator_slope * d) / below;
+    let p = lens.tangential;
+    let a = d + s * ideal.x * ideal.x + 2.0 * p.x * ideal.y + 6.0 * p.y * ideal.x;
+    let b = s * ideal.x * ideal.y + 2.0 * p.x * ideal.x + 2.0 * p.y * ideal.y;
+    let c = d + s * ideal.y * ideal.y + 6.0 * p.x * ideal.y + 2.0 * p.y * ideal.x;
+    return vec3f(a, b, c);
+}
+
+fn scaled_to(ideal: vec2f, radius: f32) -> vec2f {
+    return ideal * (radius / max(length(ideal), 1e-30));
+}
+
+// `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `origin` and the fold.
+fn inside(origin: vec2f, to: vec2f) -> vec2f {
+    let fold = fold_radius(to);
+    if length(to) < fold {
+        return to;
+    }
+    return scaled_to(to, 0.5 * (min(length(origin), fold) + fold));
+}
+
+fn table_start(distorted: vec2f) -> vec2f {
+    return distorted * radial_ratio(length(distorted));
+}
+
+// Guarded Newton. Ideal u, v, and 1 if there is such a point on the principal branch, else 0.
+fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
+    let nothing = vec3f(INVALID_UV, INVALID_UV, 0.0);
+    // Written so that NaN is refused.
+    if !(length(distorted) <= lens.distorted_max) {
+        return nothing;
+    }
+    let start_max = START_SHARE_OF_FOLD * fold_radius(start);
+    var ideal = select(start, scaled_to(start, start_max), length(start) > start_max);
+    var residual = distort(ideal) - distorted;
+    for (var i = 0; i < MAX_STEPS; i++) {
+        let j = jacobian(ideal);
+        let det = max(j.x * j.z - j.y * j.y, MIN_DETERMINANT);
+        var step = vec2f(j.y * residual.y - j.z * residual.x, j.y * residual.x - j.x * residual.y) / det;
+        let last = length(step * lens.focal_px) < LAST_STEP_PX;
+        var next = inside(ideal, ideal + step);
+        var next_residual = distort(next) - distorted;
+        // The last step is within rounding of the solution: whether its residual grew says nothing.
+        for (var halving = 0; halving < MAX_HALVINGS && !last; halving++) {
+            if dot(next_residual, next_residual) <= dot(residual, residual) {
+                break;
+            }
+            step *= 0.5;
+            next = inside(ideal, ideal + step);
+            next_residual = distort(next) - distorted;
+        }
+        ideal = next;
+        residual = next_residual;
+        if last {
+            break;
+        }
+    }
+    let j = jacobian(ideal);
+    let good = length(residual * lens.focal_px) < MAX_RESIDUAL_PX
+        && length(ideal) < fold_radius(ideal)
+        && j.x * j.z - j.y * j.y > 0.0;
+    if !good {
+        return nothing;
+    }
+    return vec3f(ideal, 1.0);
+}
