@@ -1,1 +1,294 @@
-//! (being written)
+//! Tracker: from the rows of a flight log to a motion that a vehicle could fly (paper, section 3).
+//!
+//! | kind | motion | limits | distance to the log |
+//! |---|---|---|---|
+//! | `sqrt` | two nested square-root loops on a double integrator follow the log smoothed without lag | kept at every tick | small |
+//! | `spline` | the same plant follows a quadratic B-spline fitted to the whole log under the acceleration limits | kept at every tick | smallest |
+//! | `linear` | straight lines and great circles between rows; velocity jumps at rows | none | zero |
+//! | `hold` | the pose of the latest row, without velocity | none | one row |
+//!
+//! Limits are on the lengths of the velocity, acceleration, body rate and angular acceleration vectors.
+
+use glam::DVec3;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::{
+    flight_log::LogRow,
+    pose::BodyState,
+    scenario::{TrackerKind, TrackerSpec},
+    trajectory::{Trajectory, so3},
+};
+
+mod plant;
+mod reference;
+mod report;
+mod spline;
+
+pub use report::{Channels, MotionUse, TrackReport};
+use reference::{Interpolated, Reference};
+
+/// Limits of the platform, all positive and finite.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ResolvedLimits {
+    /// Length of the velocity, m/s.
+    pub max_speed_m_s: f64,
+    /// Length of the acceleration, m/s^2.
+    pub max_acceleration_m_s2: f64,
+    /// Length of the body rate, rad/s.
+    pub max_angular_rate_rad_s: f64,
+    /// Length of the angular acceleration, rad/s^2.
+    pub max_angular_acceleration_rad_s2: f64,
+}
+
+/// Longest unbroken time, in seconds, for which each limit cut what the controller asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Saturation {
+    /// At the speed limit.
+    pub speed_s: f64,
+    /// At the acceleration limit.
+    pub acceleration_s: f64,
+    /// At the angular rate limit.
+    pub angular_rate_s: f64,
+    /// At the angular acceleration limit.
+    pub angular_acceleration_s: f64,
+}
+
+/// What [`track`] gives.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// The motion.
+    pub trajectory: Trajectory,
+    /// The limits, with `auto` resolved. `linear` and `hold` do not keep them.
+    pub limits: ResolvedLimits,
+    /// How long the limits were hit; zero for `linear` and `hold`.
+    pub saturation: Saturation,
+    /// Control rate, hertz.
+    pub rate_hz: f64,
+}
+
+/// Saturation for longer than this is reported, seconds.
+const SATURATION_WORTH_A_WARNING_S: f64 = 1.0;
+
+impl Tracked {
+    /// One sentence for each limit that was hit for more than one second, naming the key to change.
+    pub fn warnings(&self) -> Vec<String> {
+        let limits = &self.limits;
+        [
+            (self.saturation.speed_s, "max_speed_m_s", limits.max_speed_m_s),
+            (self.saturation.acceleration_s, "max_acceleration_m_s2", limits.max_acceleration_m_s2),
+            (self.saturation.angular_rate_s, "max_angular_rate_deg_s", limits.max_angular_rate_rad_s.to_degrees()),
+            (
+                self.saturation.angular_acceleration_s,
+                "max_angular_acceleration_deg_s2",
+                limits.max_angular_acceleration_rad_s2.to_degrees(),
+            ),
+        ]
+        .into_iter()
+        .filter(|(longest_s, ..)| *longest_s > SATURATION_WORTH_A_WARNING_S)
+        .map(|(longest_s, key, value)| {
+            format!("tracker.{key} = {value:.4} held the platform back for {longest_s:.2} s at a stretch; the path lags the log there, raise it to follow closer")
+        })
+        .collect()
+    }
+
+    /// Errors against the interpolated log and the motion used, at every control tick.
+    pub fn report(&self, rows: &[LogRow]) -> Option<TrackReport> {
+        TrackReport::measure(&self.trajectory, rows, self.rate_hz)
+    }
+}
+
+/// Why a log cannot be tracked.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum TrackerError {
+    /// No row.
+    #[error("the flight log has no usable row; the tracker needs at least one")]
+    Empty,
+    /// NaN or infinity in a row, or a quaternion that is not of unit length.
+    #[error("row {row} of the flight log (counted from 1, after repairs) has a number that is not finite or an attitude that is no rotation; remove the row")]
+    BadRow {
+        /// Counted from 1.
+        row: usize,
+    },
+    /// Time does not increase.
+    #[error("row {row} of the flight log (counted from 1, after repairs) is not later than the row before it; sort the log and merge rows of equal time")]
+    TimeOrder {
+        /// Counted from 1.
+        row: usize,
+    },
+    /// A key of `[tracker]` is not positive and finite.
+    #[error("tracker.{key} = {value} must be a positive, finite number")]
+    BadKey {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The log is too long for the control rate.
+    #[error("{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate or shorten flight.window_s")]
+    TooLong {
+        /// Length of the log.
+        span_s: f64,
+        /// Control rate.
+        rate_hz: f64,
+        /// Ticks needed.
+        ticks: f64,
+    },
+}
+
+/// Bound on control ticks: 3 GiB of states, 14 hours at 400 Hz.
+const MOST_TICKS: usize = 20_000_000;
+
+/// Standard deviation of the zero-lag smoothing of the reference that `sqrt` follows, seconds.
+const REFERENCE_SIGMA_S: f64 = 0.1;
+/// Standard deviation of the smooth base that `spline` corrects, seconds.
+const SPLINE_BASE_SIGMA_S: f64 = 0.1;
+
+/// The motion that follows `rows` (strictly increasing in time) as `spec` says.
+pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerError> {
+    check_rows(rows)?;
+    check_spec(spec)?;
+    let limits = resolve_limits(rows, spec);
+    let (trajectory, saturation) = match spec.kind {
+        TrackerKind::Hold => (piecewise(rows, |_, _| (DVec3::ZERO, DVec3::ZERO)), Saturation::default()),
+        TrackerKind::Linear => (piecewise(rows, constant_velocity), Saturation::default()),
+        TrackerKind::Sqrt | TrackerKind::Spline => {
+            let reference = reference(rows, spec, &limits)?;
+            let (states, saturation) = plant::follow(&reference, &limits);
+            let (start_s, end_s) = (rows[0].t_s, rows[rows.len() - 1].t_s);
+            (Trajectory::uniform(start_s, reference.step_s, end_s, states), saturation)
+        }
+    };
+    // Finite rows and positive limits give finite states, unless numbers near the end of the f64 range overflow on the way.
+    let trajectory = trajectory.ok_or(TrackerError::BadRow { row: 1 })?;
+    Ok(Tracked { trajectory, limits, saturation, rate_hz: spec.rate_hz })
+}
+
+fn reference(rows: &[LogRow], spec: &TrackerSpec, limits: &ResolvedLimits) -> Result<Reference, TrackerError> {
+    let (start_s, span_s) = (rows[0].t_s, rows[rows.len() - 1].t_s - rows[0].t_s);
+    let step_s = 1.0 / spec.rate_hz;
+    let ticks = (span_s * spec.rate_hz - 1e-6).ceil().max(0.0) + 1.0;
+    if ticks > MOST_TICKS as f64 {
+        return Err(TrackerError::TooLong { span_s, rate_hz: spec.rate_hz, ticks });
+    }
+    let count = ticks as usize + 1;
+    let mut log = Interpolated::new(rows).ok_or(TrackerError::Empty)?;
+    Ok(match spec.kind {
+        TrackerKind::Spline => {
+            let smoothed = Reference::smoothed(&mut log, start_s, step_s, count, SPLINE_BASE_SIGMA_S);
+            let raw = Reference::sampled(&mut log, start_s, step_s, count);
+            spline::planned(&raw, smoothed, limits)
+        }
+        _ => Reference::smoothed(&mut log, start_s, step_s, count, REFERENCE_SIGMA_S),
+    })
+}
+
+fn check_rows(rows: &[LogRow]) -> Result<(), TrackerError> {
+    if rows.is_empty() {
+        return Err(TrackerError::Empty);
+    }
+    for (i, row) in rows.iter().enumerate() {
+        let unit = (row.ned_from_body.length_squared() - 1.0).abs() < 1e-6;
+        // Beyond 1e12 m or s nothing is left of f64's resolution and squares approach overflow.
+        let sane = row.t_s.abs() < 1e12 && row.position_ned_m.abs().max_element() < 1e12;
+        if !(unit && sane && row.position_ned_m.is_finite()) {
+            return Err(TrackerError::BadRow { row: i + 1 });
+        }
+        if i > 0 && row.t_s <= rows[i - 1].t_s {
+            return Err(TrackerError::TimeOrder { row: i + 1 });
+        }
+    }
+    Ok(())
+}
+
+fn check_spec(spec: &TrackerSpec) -> Result<(), TrackerError> {
+    let keys = [
+        ("rate_hz", Some(spec.rate_hz)),
+        ("max_speed_m_s", spec.max_speed_m_s.value()),
+        ("max_acceleration_m_s2", Some(spec.max_acceleration_m_s2)),
+        ("max_angular_rate_deg_s", spec.max_angular_rate_deg_s.value()),
+        ("max_angular_acceleration_deg_s2", Some(spec.max_angular_acceleration_deg_s2)),
+    ];
+    for (key, value) in keys {
+        if let Some(value) = value
+            && !(value > 0.0 && value < 1e12)
+        {
+            return Err(TrackerError::BadKey { key, value });
+        }
+    }
+    Ok(())
+}
+
+/// Rows at least this far apart give the log's own speeds, so that steps of 50 us and quanta of 0.1 m do not.
+const BASELINE_S: f64 = 0.2;
+/// `auto` is this factor times the log's own ...
+const AUTO_FACTOR: f64 = 1.2;
+/// ... speed at this rank ...
+const AUTO_RANK: f64 = 0.999;
+/// ... but at least 1 m/s ...
+const LEAST_SPEED_M_S: f64 = 1.0;
+/// ... and 10 deg/s.
+const LEAST_RATE_RAD_S: f64 = 0.174_532_925_199_432_95;
+
+fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec) -> ResolvedLimits {
+    let (mut speeds, mut rates) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
+    let mut later = 0;
+    for row in rows {
+        while later + 1 < rows.len() && rows[later].t_s - row.t_s < BASELINE_S {
+            later += 1;
+        }
+        let (to, elapsed_s) = (&rows[later], rows[later].t_s - row.t_s);
+        // The last rows have no partner that far away, unless the whole log is shorter.
+        if elapsed_s >= BASELINE_S || (speeds.is_empty() && elapsed_s > 0.0) {
+            speeds.push((to.position_ned_m - row.position_ned_m).length() / elapsed_s);
+            rates.push(so3::log(row.ned_from_body.inverse() * to.ned_from_body).length() / elapsed_s);
+        }
+    }
+    ResolvedLimits {
+        max_speed_m_s: spec.max_speed_m_s.value().unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(LEAST_SPEED_M_S)),
+        max_acceleration_m_s2: spec.max_acceleration_m_s2,
+        max_angular_rate_rad_s: spec
+            .max_angular_rate_deg_s
+            .value()
+            .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(LEAST_RATE_RAD_S), f64::to_radians),
+        max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.to_radians(),
+    }
+}
+
+/// The value at [`AUTO_RANK`], 0 without values.
+fn high_rank(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let rank = ((values.len() - 1) as f64 * AUTO_RANK).ceil() as usize;
+    *values.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+/// One segment a row; `velocities` gives velocity and body rate from a row and the next one. The last row continues as the one before.
+fn piecewise(rows: &[LogRow], velocities: impl Fn(&LogRow, &LogRow) -> (DVec3, DVec3)) -> Option<Trajectory> {
+    let mut motion = (DVec3::ZERO, DVec3::ZERO);
+    let knots = rows.iter().enumerate().map(|(i, row)| {
+        if let Some(next) = rows.get(i + 1) {
+            motion = velocities(row, next);
+        }
+        BodyState {
+            position_ned_m: row.position_ned_m,
+            velocity_ned_m_s: motion.0,
+            acceleration_ned_m_s2: DVec3::ZERO,
+            ned_from_body: row.ned_from_body,
+            rate_body_rad_s: motion.1,
+            angular_acceleration_body_rad_s2: DVec3::ZERO,
+        }
+    });
+    let knots = knots.collect();
+    Trajectory::listed(rows.iter().map(|row| row.t_s).collect(), rows.last()?.t_s, knots)
+}
+
+fn constant_velocity(row: &LogRow, next: &LogRow) -> (DVec3, DVec3) {
+    let elapsed_s = next.t_s - row.t_s;
+    let turn = so3::log(row.ned_from_body.inverse() * next.ned_from_body);
+    ((next.position_ned_m - row.position_ned_m) / elapsed_s, turn / elapsed_s)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,277 @@
-//! (being written)
+//! Trajectory: pose, velocity and acceleration of the platform at any instant, in closed form.
+//!
+//! Between two knots the platform is a double integrator with constant acceleration `a` and constant body angular acceleration
+//! `alpha`, so that with tau = t - t_k
+//!
+//! ```text
+//! x(t) = x_k + v_k tau + a tau^2/2          v(t) = v_k + a tau
+//! R(t) = R_k Exp(w_k tau + alpha tau^2/2 + tau^3/12 w_k x alpha)          w(t) = w_k + alpha tau
+//! ```
+//!
+//! The cubic term is the second Magnus term. The error of R over one segment is of order `tau^5 |w|^2 |alpha|`:
+//! 1e-13 rad at 120 deg/s and 200 Hz, 1e-8 rad at 400 deg/s and 20 000 deg/s^2.
+
+use glam::DVec3;
+
+use crate::pose::BodyState;
+
+pub mod so3;
+
+/// Beyond this many seconds outside the span the motion stops, which keeps every finite time finite.
+const LONGEST_COAST_S: f64 = 1e9;
+
+/// When the knots are.
+#[derive(Clone, Debug)]
+enum Clock {
+    /// Knot k at `start_s + k step_s`.
+    Uniform { step_s: f64 },
+    /// Strictly increasing times, one a knot.
+    Listed(Vec<f64>),
+}
+
+/// Motion of the platform: segments of constant acceleration, each from one knot to the next.
+#[derive(Clone, Debug)]
+pub struct Trajectory {
+    clock: Clock,
+    /// State at the beginning of each segment; never empty.
+    knots: Vec<BodyState>,
+    start_s: f64,
+    end_s: f64,
+    /// State at `end_s`, without acceleration.
+    last: BodyState,
+}
+
+impl Trajectory {
+    /// Segments of equal length `step_s`, the first beginning at `start_s`; the last one ends at `end_s`.
+    ///
+    /// `None` if there is no knot, a number is not finite, or `end_s` is not within the segments or at most one step after them.
+    pub fn uniform(start_s: f64, step_s: f64, end_s: f64, knots: Vec<BodyState>) -> Option<Self> {
+        let beyond_s = start_s + step_s * (knots.len() as f64 + 1e-6);
+        let ordered = step_s > 0.0 && step_s.is_finite() && start_s.is_finite() && end_s >= start_s && end_s <= beyond_s;
+        Self::build(Clock::Uniform { step_s }, start_s, end_s, ordered, knots)
+    }
+
+    /// Segments that begin at `times_s` (strictly increasing, one a knot); the last one ends at `end_s`, not before it begins.
+    ///
+    /// `None` if there is no knot, a number is not finite, or the times are not as said.
+    pub fn listed(times_s: Vec<f64>, end_s: f64, knots: Vec<BodyState>) -> Option<Self> {
+        let start_s = *times_s.first()?;
+        let ordered = times_s.len() == knots.len()
+            && times_s.iter().all(|t| t.is_finite())
+            && times_s.windows(2).all(|pair| pair[0] < pair[1])
+            && times_s.last().is_some_and(|last| *last <= end_s)
+            && end_s.is_finite();
+        Self::build(Clock::Listed(times_s), start_s, end_s, ordered, knots)
+    }
+
+    fn build(clock: Clock, start_s: f64, end_s: f64, ordered: bool, knots: Vec<BodyState>) -> Option<Self> {
+        let last = *knots.last()?;
+        if !ordered || !knots.iter().all(is_finite) {
+            return None;
+        }
+        let mut trajectory = Self { clock, knots, start_s, end_s, last };
+        let k = trajectory.segment(end_s);
+        trajectory.last = without_acceleration(&advance(&trajectory.knots[k], end_s - trajectory.knot_s(k)));
+        Some(trajectory)
+    }
+
+    /// First and last instant that the log covers, seconds.
+    pub fn span_s(&self) -> (f64, f64) {
+        (self.start_s, self.end_s)
+    }
+
+    /// Number of segments.
+    pub fn segments(&self) -> usize {
+        self.knots.len()
+    }
+
+    /// Instant at which segment `k` begins, seconds; `k` below [`Self::segments`].
+    pub fn knot_s(&self, k: usize) -> f64 {
+        match &self.clock {
+            Clock::Uniform { step_s } => self.start_s + step_s * k as f64,
+            Clock::Listed(times_s) => times_s[k.min(times_s.len() - 1)],
+        }
+    }
+
+    /// States at the beginnings of all segments, in order of time.
+    pub fn knots(&self) -> &[BodyState] {
+        &self.knots
+    }
+
+    /// Motion state at `t_s`, at O(1) cost for control ticks and O(log n) for rows of a log.
+    ///
+    /// Outside [`Self::span_s`] the platform coasts: velocity and body rate stay as they are at the end, for at most 1e9 s.
+    /// NaN gives the beginning.
+    pub fn state(&self, t_s: f64) -> BodyState {
+        if t_s >= self.end_s {
+            return advance(&self.last, (t_s - self.end_s).min(LONGEST_COAST_S));
+        }
+        let tau_s = t_s - self.start_s;
+        if tau_s < 0.0 {
+            return advance(&without_acceleration(&self.knots[0]), tau_s.max(-LONGEST_COAST_S));
+        }
+        if t_s.is_nan() {
+            return self.knots[0];
+        }
+        let k = self.segment(t_s);
+        advance(&self.knots[k], t_s - self.knot_s(k))
+    }
+
+    /// The segment that holds `t_s`, which is inside the span.
+    fn segment(&self, t_s: f64) -> usize {
+        let last = self.knots.len() - 1;
+        match &self.clock {
+            // Saturating cast: the quotient is not negative; rounding at a knot only moves a continuous seam.
+            Clock::Uniform { step_s } => (((t_s - self.start_s) / step_s) as usize).min(last),
+            Clock::Listed(times_s) => times_s.partition_point(|knot| *knot <= t_s).saturating_sub(1).min(last),
+        }
+    }
+}
+
+/// The state `tau_s` after `from`, which may be negative, under the accelerations of `from` (formulas in the module's text).
+pub fn advance(from: &BodyState, tau_s: f64) -> BodyState {
+    let (rate, alpha) = (from.rate_body_rad_s, from.angular_acceleration_body_rad_s2);
+    let half2 = 0.5 * tau_s * tau_s;
+    let magnus = rate.cross(alpha) * (tau_s * half2 / 6.0);
+    BodyState {
+        position_ned_m: from.position_ned_m + from.velocity_ned_m_s * tau_s + from.acceleration_ned_m_s2 * half2,
+        velocity_ned_m_s: from.velocity_ned_m_s + from.acceleration_ned_m_s2 * tau_s,
+        ned_from_body: from.ned_from_body * so3::exp(rate * tau_s + alpha * half2 + magnus),
+        rate_body_rad_s: rate + alpha * tau_s,
+        ..*from
+    }
+}
+
+fn without_acceleration(state: &BodyState) -> BodyState {
+    BodyState { acceleration_ned_m_s2: DVec3::ZERO, angular_acceleration_body_rad_s2: DVec3::ZERO, ..*state }
+}
+
+fn is_finite(state: &BodyState) -> bool {
+    state.position_ned_m.is_finite()
+        && state.velocity_ned_m_s.is_finite()
+        && state.acceleration_ned_m_s2.is_finite()
+        && state.ned_from_body.is_finite()
+        && state.rate_body_rad_s.is_finite()
+        && state.angular_acceleration_body_rad_s2.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use glam::DQuat;
+
+    use super::*;
+
+    fn still() -> BodyState {
+        BodyState {
+            position_ned_m: DVec3::new(10.0, -20.0, -100.0),
+            velocity_ned_m_s: DVec3::new(12.0, 1.0, -0.5),
+            acceleration_ned_m_s2: DVec3::new(-3.0, 8.0, 2.0),
+            ned_from_body: so3::exp(DVec3::new(0.2, -0.4, 1.0)),
+            rate_body_rad_s: DVec3::new(1.0, -1.5, 0.8),
+            angular_acceleration_body_rad_s2: DVec3::new(-0.7, 0.5, 0.9),
+        }
+    }
+
+    /// Several segments whose accelerations differ but whose states join.
+    fn joined(step_s: f64, count: usize) -> Trajectory {
+        let mut knots = vec![still()];
+        for k in 1..count {
+            let mut next = advance(&knots[k - 1], step_s);
+            let wave = k as f64;
+            next.acceleration_ned_m_s2 = DVec3::new(wave.sin(), (2.0 * wave).cos(), 0.3) * 15.0;
+            next.angular_acceleration_body_rad_s2 = DVec3::new((3.0 * wave).sin(), 0.2, wave.cos());
+            knots.push(next);
+        }
+        Trajectory::uniform(5.0, step_s, 5.0 + step_s * count as f64, knots).unwrap()
+    }
+
+    #[test]
+    fn segment_agrees_with_fine_integration() {
+        // 2000 midpoint-exponential steps within one 5 ms tick: their own error is of order (5e-3)^3 / 2000^2.
+        let (start, tau_s, steps) = (still(), 5e-3, 2000);
+        let h = tau_s / f64::from(steps);
+        let (mut x, mut v, mut q) = (start.position_ned_m, start.velocity_ned_m_s, start.ned_from_body);
+        for i in 0..steps {
+            let mid_s = (f64::from(i) + 0.5) * h;
+            x += (v + start.acceleration_ned_m_s2 * (0.5 * h)) * h;
+            v += start.acceleration_ned_m_s2 * h;
+            q *= so3::exp((start.rate_body_rad_s + start.angular_acceleration_body_rad_s2 * mid_s) * h);
+        }
+        let end = advance(&start, tau_s);
+        assert!((end.position_ned_m - x).length() < 1e-12);
+        assert!((end.velocity_ned_m_s - v).length() < 1e-12);
+        assert!(so3::log(end.ned_from_body.inverse() * q).length() < 1e-12);
+    }
+
+    #[test]
+    fn position_velocity_attitude_and_rate_are_continuous() {
+        let trajectory = joined(0.01, 40);
+        for k in 1..40 {
+            let seam_s = trajectory.knot_s(k);
+            let (before, after) = (trajectory.state(seam_s - 1e-9), trajectory.state(seam_s + 1e-9));
+            // Two nanoseconds of motion at under 20 m/s, 20 m/s^2, 3 rad/s and 2 rad/s^2.
+            assert!((after.position_ned_m - before.position_ned_m).length() < 5e-8);
+            assert!((after.velocity_ned_m_s - before.velocity_ned_m_s).length() < 1e-7);
+            assert!(so3::log(before.ned_from_body.inverse() * after.ned_from_body).length() < 1e-8);
+            assert!((after.rate_body_rad_s - before.rate_body_rad_s).length() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn velocity_and_rate_are_derivatives() {
+        let trajectory = joined(0.01, 40);
+        let h = 1e-4;
+        for k in 0..40 {
+            let t_s = trajectory.knot_s(k) + 0.0043;
+            let (before, at, after) = (trajectory.state(t_s - h), trajectory.state(t_s), trajectory.state(t_s + h));
+            let velocity = (after.position_ned_m - before.position_ned_m) / (2.0 * h);
+            let rate = so3::log(before.ned_from_body.inverse() * after.ned_from_body) / (2.0 * h);
+            // Rounding of positions (1e-14 m / 2e-4 s); for the rate also h^2 |w x alpha| / 6.
+            assert!((velocity - at.velocity_ned_m_s).length() < 1e-9);
+            assert!((rate - at.rate_body_rad_s).length() < 2e-8);
+        }
+    }
+
+    #[test]
+    fn coasts_outside_and_survives_any_time() {
+        let trajectory = joined(0.01, 10);
+        let (start_s, end_s) = trajectory.span_s();
+        for (inside_s, outside_s) in [(start_s, start_s - 2.0), (end_s, end_s + 3.0)] {
+            let (edge, out) = (trajectory.state(inside_s), trajectory.state(outside_s));
+            assert_eq!(edge.velocity_ned_m_s, out.velocity_ned_m_s);
+            assert_eq!(edge.rate_body_rad_s, out.rate_body_rad_s);
+            let moved = edge.position_ned_m + edge.velocity_ned_m_s * (outside_s - inside_s);
+            assert!((moved - out.position_ned_m).length() < 1e-12);
+        }
+        for t_s in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300, 5e-324] {
+            assert!(is_finite(&trajectory.state(t_s)), "{t_s}");
+        }
+        assert_eq!(trajectory.state(f64::NAN).position_ned_m, still().position_ned_m);
+    }
+
+    #[test]
+    fn listed_knots_are_found_and_faults_refused() {
+        let times = vec![0.0, 1.0, 1.00005, 4.0];
+        let knots: Vec<_> = (0..4)
+            .map(|k| BodyState {
+                position_ned_m: DVec3::splat(f64::from(k)),
+                velocity_ned_m_s: DVec3::ZERO,
+                acceleration_ned_m_s2: DVec3::ZERO,
+                ned_from_body: DQuat::IDENTITY,
+                rate_body_rad_s: DVec3::ZERO,
+                angular_acceleration_body_rad_s2: DVec3::ZERO,
+            })
+            .collect();
+        let trajectory = Trajectory::listed(times.clone(), 4.0, knots.clone()).unwrap();
+        for (t_s, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.999, 0.0), (1.0, 1.0), (1.0001, 2.0), (3.99, 2.0), (4.0, 3.0), (9.0, 3.0)] {
+            assert_eq!(trajectory.state(t_s).position_ned_m.x, expected, "{t_s}");
+        }
+        assert!(Trajectory::listed(vec![], 0.0, vec![]).is_none());
+        assert!(Trajectory::listed(vec![0.0, 0.0, 1.0, 2.0], 2.0, knots.clone()).is_none());
+        assert!(Trajectory::listed(times.clone(), 3.0, knots.clone()).is_none());
+        assert!(Trajectory::listed(times, f64::NAN, knots.clone()).is_none());
+        assert!(Trajectory::uniform(0.0, 0.0, 0.0, knots.clone()).is_none());
+        assert!(Trajectory::uniform(0.0, 0.1, 0.6, knots).is_none());
+    }
+}

@@ -1,0 +1,146 @@
+//! Controller and plant: two nested square-root loops on a double integrator, for position and for attitude (paper, section 3).
+//!
+//! The outer loop turns the error e into a velocity relative to the target, eq. (2) with a linear zone around the origin:
+//! `p e` for e below `b/p^2`, else `sqrt(2 b (e - b/(2 p^2)))`, both with slope p where they meet. The target's own velocity is added
+//! (feed-forward) and the sum is limited. The inner loop does the same from velocity error to acceleration; no limit is put on jerk, so its square
+//! root is infinitely steep and what remains is its linear zone, which is everything that one tick can correct, and the acceleration limit.
+//!
+//! Errors, speeds and accelerations are vectors and their lengths are limited. The velocity after a tick lies between the one before and the
+//! wanted one, both inside the ball of the speed limit, so all limits hold at every tick, whatever the log does.
+
+use glam::{DQuat, DVec3};
+
+use super::{ResolvedLimits, Saturation, reference::Reference};
+use crate::{
+    pose::BodyState,
+    trajectory::{advance, so3},
+};
+
+/// Gain of the linear zone, 1/s. With braking at 0.8 of the limit a 10 m step is overshoot-free from 50 to 1000 Hz.
+const LINEAR_GAIN_HZ: f64 = 8.0;
+/// Bound on gain times step: at lower control rates the linear zone grows instead of ringing.
+const LARGEST_GAIN_STEP: f64 = 0.16;
+/// Share of the acceleration limit that braking counts on; the rest is for the target's own acceleration and the finite tick.
+const BRAKING_SHARE: f64 = 0.8;
+/// A demand counts as limited beyond this relative excess, which is above rounding.
+const EXCESS: f64 = 1e-9;
+/// Accelerations stay below their limit by this share: a difference of velocities, divided by the step, is rounded.
+const ROUNDING_SHARE: f64 = 1e-10;
+
+/// One channel group (position or attitude): limits on the lengths of its velocity and acceleration.
+#[derive(Clone, Copy, Debug)]
+struct SqrtLoops {
+    step_s: f64,
+    gain_hz: f64,
+    braking: f64,
+    max_velocity: f64,
+    max_acceleration: f64,
+}
+
+/// Velocity after one tick, and which limits cut the demand.
+struct Step {
+    velocity: DVec3,
+    velocity_limited: bool,
+    acceleration_limited: bool,
+}
+
+impl SqrtLoops {
+    fn new(step_s: f64, max_velocity: f64, max_acceleration: f64) -> Self {
+        let gain_hz = LINEAR_GAIN_HZ.min(LARGEST_GAIN_STEP / step_s);
+        Self { step_s, gain_hz, braking: BRAKING_SHARE * max_acceleration, max_velocity, max_acceleration }
+    }
+
+    /// Closing velocity for an error: along it, with the length of the SQRT gain.
+    fn closing(&self, error: DVec3) -> DVec3 {
+        let distance = error.length();
+        let linear_zone = self.braking / (self.gain_hz * self.gain_hz);
+        if distance <= linear_zone {
+            error * self.gain_hz
+        } else {
+            error * ((2.0 * self.braking * (distance - 0.5 * linear_zone)).sqrt() / distance)
+        }
+    }
+
+    /// One tick of both loops.
+    fn step(&self, velocity: DVec3, error: DVec3, target_velocity: DVec3) -> Step {
+        let demand = target_velocity + self.closing(error);
+        let wanted = demand.clamp_length_max(self.max_velocity);
+        let change = wanted - velocity;
+        let largest = self.max_acceleration * (1.0 - ROUNDING_SHARE) * self.step_s;
+        Step {
+            velocity: velocity + change.clamp_length_max(largest),
+            velocity_limited: demand.length() > self.max_velocity * (1.0 + EXCESS),
+            acceleration_limited: change.length() > largest * (1.0 + EXCESS),
+        }
+    }
+}
+
+/// Follows the reference from its own first state and returns the state at each tick, with the accelerations until the next one.
+pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> (Vec<BodyState>, Saturation) {
+    let step_s = reference.step_s;
+    let linear = SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2);
+    let angular = SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
+    let mut saturation = SaturationClock::new(step_s);
+    let mut target = reference.target(0);
+    let mut state = BodyState {
+        position_ned_m: target.position_ned_m,
+        velocity_ned_m_s: target.velocity_ned_m_s.clamp_length_max(limits.max_speed_m_s),
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: target.ned_from_body,
+        rate_body_rad_s: target.rate_body_rad_s.clamp_length_max(limits.max_angular_rate_rad_s),
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let mut states = Vec::with_capacity(reference.ticks());
+    for k in 1..reference.ticks() {
+        let next = reference.target(k);
+
+        // The error that would be left if the next tick had exactly the target's velocity.
+        let reached = state.position_ned_m + (state.velocity_ned_m_s + next.velocity_ned_m_s) * (0.5 * step_s);
+        let moved = linear.step(state.velocity_ned_m_s, next.position_ned_m - reached, next.velocity_ned_m_s);
+        state.acceleration_ned_m_s2 = (moved.velocity - state.velocity_ned_m_s) / step_s;
+
+        // The same on the rotation group: the error is a rotation vector in body axes, and the target's rate is turned into them.
+        let own_from_target: DQuat = state.ned_from_body.inverse() * target.ned_from_body;
+        let target_rate = own_from_target * next.rate_body_rad_s;
+        let (rate, mean_rate) = (state.rate_body_rad_s, 0.5 * (state.rate_body_rad_s + target_rate));
+        let coning = rate.cross(target_rate) * (step_s * step_s / 12.0);
+        let reached = state.ned_from_body * so3::exp(mean_rate * step_s + coning);
+        let turned = angular.step(rate, so3::log(reached.inverse() * next.ned_from_body), target_rate);
+        state.angular_acceleration_body_rad_s2 = (turned.velocity - rate) / step_s;
+
+        saturation.tick([moved.velocity_limited, moved.acceleration_limited, turned.velocity_limited, turned.acceleration_limited]);
+        states.push(state);
+        state = advance(&state, step_s);
+        // Velocities are copied, not integrated, so that rounding cannot creep over a limit.
+        state.velocity_ned_m_s = moved.velocity;
+        state.rate_body_rad_s = turned.velocity;
+        state.ned_from_body = state.ned_from_body.normalize();
+        target = next;
+    }
+    state.acceleration_ned_m_s2 = DVec3::ZERO;
+    state.angular_acceleration_body_rad_s2 = DVec3::ZERO;
+    states.push(state);
+    (states, saturation.longest)
+}
+
+/// Longest unbroken time at each limit.
+struct SaturationClock {
+    step_s: f64,
+    running_s: [f64; 4],
+    longest: Saturation,
+}
+
+impl SaturationClock {
+    fn new(step_s: f64) -> Self {
+        Self { step_s, running_s: [0.0; 4], longest: Saturation::default() }
+    }
+
+    fn tick(&mut self, limited: [bool; 4]) {
+        let longest =
+            [&mut self.longest.speed_s, &mut self.longest.acceleration_s, &mut self.longest.angular_rate_s, &mut self.longest.angular_acceleration_s];
+        for ((running_s, limited), longest_s) in self.running_s.iter_mut().zip(limited).zip(longest) {
+            *running_s = if limited { *running_s + self.step_s } else { 0.0 };
+            *longest_s = longest_s.max(*running_s);
+        }
+    }
+}

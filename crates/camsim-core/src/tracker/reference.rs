@@ -1,0 +1,205 @@
+//! The reference that the plant follows: the log, interpolated, sampled half-way between control ticks and smoothed without lag.
+
+use glam::{DQuat, DVec3, DVec4};
+
+use crate::{flight_log::LogRow, trajectory::so3};
+
+/// The log between its rows: straight lines in position, great circles in attitude. Rows are in order of time.
+#[derive(Clone, Debug)]
+pub(crate) struct Interpolated<'a> {
+    rows: &'a [LogRow],
+    /// Where the last look-up was; look-ups mostly go forward.
+    row: usize,
+}
+
+impl<'a> Interpolated<'a> {
+    /// `None` for a log without rows.
+    pub(crate) fn new(rows: &'a [LogRow]) -> Option<Self> {
+        (!rows.is_empty()).then_some(Self { rows, row: 0 })
+    }
+
+    /// Position and attitude at `t_s`; outside the log the first or last row.
+    pub(crate) fn at(&mut self, t_s: f64) -> (DVec3, DQuat) {
+        let later = self.rows.get(self.row + 1).is_some_and(|next| next.t_s <= t_s);
+        if later || self.rows[self.row].t_s > t_s {
+            let ahead = self.row + 2;
+            let near = later && self.rows.get(ahead).is_none_or(|row| row.t_s > t_s);
+            self.row = if near { self.row + 1 } else { self.rows.partition_point(|row| row.t_s <= t_s).saturating_sub(1) };
+        }
+        let from = &self.rows[self.row];
+        let Some(to) = self.rows.get(self.row + 1) else { return (from.position_ned_m, from.ned_from_body) };
+        let part = ((t_s - from.t_s) / (to.t_s - from.t_s)).clamp(0.0, 1.0);
+        let turn = so3::log(from.ned_from_body.inverse() * to.ned_from_body);
+        (from.position_ned_m.lerp(to.position_ned_m, part), from.ned_from_body * so3::exp(turn * part))
+    }
+
+    /// As [`Self::at`], but continued beyond either end by point reflection, which keeps position and velocity continuous there.
+    fn reflected(&mut self, t_s: f64) -> (DVec3, DQuat) {
+        let (first, last) = (self.rows[0], self.rows[self.rows.len() - 1]);
+        let edge = if t_s < first.t_s {
+            first
+        } else if t_s > last.t_s {
+            last
+        } else {
+            return self.at(t_s);
+        };
+        let (position, attitude) = self.at(2.0 * edge.t_s - t_s);
+        (2.0 * edge.position_ned_m - position, (edge.ned_from_body * attitude.inverse() * edge.ned_from_body).normalize())
+    }
+}
+
+/// Positions and attitudes at the middles of control intervals, as the coefficients of a uniform quadratic B-spline:
+/// at tick k the position is the mean of coefficients k and k + 1 and the velocity their difference over the step. A double
+/// integrator that starts on such a reference and has accelerations enough stays on it exactly.
+#[derive(Clone, Debug)]
+pub(crate) struct Reference {
+    pub(crate) step_s: f64,
+    pub(crate) position_ned_m: Vec<DVec3>,
+    pub(crate) ned_from_body: Vec<DQuat>,
+}
+
+/// What the plant should do at one control tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Target {
+    pub(crate) position_ned_m: DVec3,
+    pub(crate) velocity_ned_m_s: DVec3,
+    pub(crate) ned_from_body: DQuat,
+    pub(crate) rate_body_rad_s: DVec3,
+}
+
+impl Reference {
+    /// The interpolated log at the `count` instants `start_s + (k - 1/2) step_s`.
+    pub(crate) fn sampled(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, count: usize) -> Self {
+        Self::sampled_from(log, start_s, step_s, 0, count)
+    }
+
+    fn sampled_from(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, before: usize, count: usize) -> Self {
+        let (mut position_ned_m, mut ned_from_body) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let mut previous = DQuat::IDENTITY;
+        for k in 0..count {
+            let (position, attitude) = log.reflected(start_s + (k as f64 - before as f64 - 0.5) * step_s);
+            // q and -q are one attitude; the nearer of the two is the one that can be averaged with its neighbour.
+            previous = if k > 0 && previous.dot(attitude) < 0.0 { -attitude } else { attitude };
+            position_ned_m.push(position);
+            ned_from_body.push(previous);
+        }
+        Self { step_s, position_ned_m, ned_from_body }
+    }
+
+    /// The log smoothed by four moving averages in a row, which together are close to a Gaussian of `sigma_s` and shift nothing in time.
+    pub(crate) fn smoothed(log: &mut Interpolated<'_>, start_s: f64, step_s: f64, count: usize, sigma_s: f64) -> Self {
+        // The variance of one average over 2 h + 1 ticks is h (h + 1) / 3 ticks^2; four of them add up to sigma^2.
+        let ticks2 = (sigma_s / step_s).powi(2);
+        let half = ((0.25 + 0.75 * ticks2).sqrt() - 0.5).round().max(0.0) as usize;
+        let raw = Self::sampled_from(log, start_s, step_s, PASSES * half, count + 2 * PASSES * half);
+        let (mut position, mut attitude) = (raw.position_ned_m, raw.ned_from_body);
+        for _ in 0..PASSES {
+            position = moving_average(&position, half);
+            attitude = average_attitude(&attitude, half);
+        }
+        Self { step_s, position_ned_m: position, ned_from_body: attitude }
+    }
+
+    /// Number of control ticks.
+    pub(crate) fn ticks(&self) -> usize {
+        self.position_ned_m.len() - 1
+    }
+
+    /// Target at tick `k`, below [`Self::ticks`].
+    pub(crate) fn target(&self, k: usize) -> Target {
+        let (x0, x1) = (self.position_ned_m[k], self.position_ned_m[k + 1]);
+        let (q0, q1) = (self.ned_from_body[k], self.ned_from_body[k + 1]);
+        let turn = so3::log(q0.inverse() * q1);
+        Target {
+            position_ned_m: 0.5 * (x0 + x1),
+            velocity_ned_m_s: (x1 - x0) / self.step_s,
+            ned_from_body: q0 * so3::exp(0.5 * turn),
+            rate_body_rad_s: turn / self.step_s,
+        }
+    }
+}
+
+/// Number of moving averages: four give a kernel with two continuous derivatives.
+const PASSES: usize = 4;
+
+/// Means over `2 half + 1` values; the result is shorter by `2 half`. The running sum carries the rounding of each step, so values
+/// are taken relative to the first one.
+fn moving_average(values: &[DVec3], half: usize) -> Vec<DVec3> {
+    let width = 2 * half + 1;
+    let Some(&base) = values.first() else { return Vec::new() };
+    let mut sum: DVec3 = values.iter().take(width - 1).map(|value| *value - base).sum();
+    let mut means = Vec::with_capacity(values.len().saturating_sub(2 * half));
+    for (leaving, entering) in values.iter().zip(values.iter().skip(width - 1)) {
+        sum += *entering - base;
+        means.push(base + sum / width as f64);
+        sum -= *leaving - base;
+    }
+    means
+}
+
+/// Normalised mean quaternions. Exact for a constant rate, otherwise an error of third order in the angle that the window spans.
+/// Where the log turns so fast that the mean says nothing, the attitude stays as it is.
+fn average_attitude(values: &[DQuat], half: usize) -> Vec<DQuat> {
+    let width = 2 * half + 1;
+    let components = |q: &DQuat| DVec4::new(q.x, q.y, q.z, q.w);
+    let mut sum: DVec4 = values.iter().take(width - 1).map(components).sum();
+    let mut means: Vec<DQuat> = Vec::with_capacity(values.len().saturating_sub(2 * half));
+    for (k, (leaving, entering)) in values.iter().zip(values.iter().skip(width - 1)).enumerate() {
+        sum += components(entering);
+        let mean = sum / width as f64;
+        let length = mean.length();
+        let mean = if length > 0.5 { DQuat::from_vec4(mean / length) } else { values[k + half] };
+        means.push(if means.last().is_some_and(|before| before.dot(mean) < 0.0) { -mean } else { mean });
+        sum -= components(leaving);
+    }
+    means
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn row(t_s: f64, north_m: f64, yaw_rad: f64) -> LogRow {
+        LogRow { t_s, position_ned_m: DVec3::new(north_m, 0.0, -50.0), ned_from_body: DQuat::from_rotation_z(yaw_rad) }
+    }
+
+    #[test]
+    fn looks_up_forward_backward_and_outside() {
+        let rows: Vec<_> = (0..50).map(|i| row(f64::from(i), f64::from(i * i), 0.1 * f64::from(i))).collect();
+        let mut log = Interpolated::new(&rows).unwrap();
+        for (t_s, north_m) in [(0.5, 0.5), (1.5, 2.5), (48.5, 2352.5), (3.0, 9.0), (2.999, 8.995), (-9.0, 0.0), (99.0, 2401.0), (49.0, 2401.0)] {
+            let (position, attitude) = log.at(t_s);
+            assert!((position.x - north_m).abs() < 1e-9, "{t_s}");
+            let yaw = 0.1 * t_s.clamp(0.0, 49.0);
+            assert!(so3::log(DQuat::from_rotation_z(yaw).inverse() * attitude).length() < 1e-12, "{t_s}");
+        }
+        assert!(Interpolated::new(&[]).is_none());
+    }
+
+    #[test]
+    fn smoothing_keeps_uniform_motion_to_both_ends() {
+        let rows: Vec<_> = (0..9).map(|i| row(0.5 * f64::from(i), 3.0 * f64::from(i), 0.7 * f64::from(i))).collect();
+        let mut log = Interpolated::new(&rows).unwrap();
+        let reference = Reference::smoothed(&mut log, 0.0, 0.01, 402, 0.1);
+        for k in [0, 1, 200, 399, 400] {
+            let target = reference.target(k);
+            assert!((target.position_ned_m.x - 0.06 * k as f64).abs() < 1e-9);
+            assert!((target.velocity_ned_m_s.x - 6.0).abs() < 1e-9);
+            assert!((target.rate_body_rad_s - DVec3::new(0.0, 0.0, 1.4)).length() < 1e-9);
+            let expected = DQuat::from_rotation_z(0.014 * k as f64);
+            assert!(so3::log(expected.inverse() * target.ned_from_body).length() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn kernel_has_the_variance_asked_for() {
+        // A parabola gains sigma^2 times half its second derivative.
+        let rows: Vec<_> = (0..4001).map(|i| row(0.001 * f64::from(i), (0.001 * f64::from(i) - 2.0).powi(2), 0.0)).collect();
+        let mut log = Interpolated::new(&rows).unwrap();
+        let reference = Reference::smoothed(&mut log, 0.0, 0.001, 4001, 0.1);
+        let gained = reference.position_ned_m[2000].x - (2000.0 * 0.001 - 0.0005 - 2.0f64).powi(2);
+        // The half width is a whole number of ticks: 1 % at 1 ms.
+        assert!((gained - 0.01).abs() < 2e-4, "{gained}");
+    }
+}

@@ -1,0 +1,161 @@
+//! Spline planner: the whole log is known, so the reference can be the closest motion that the plant is able to follow.
+//!
+//! A uniform quadratic B-spline has constant acceleration between ticks, exactly what the plant can do. Its coefficients c minimise
+//!
+//! ```text
+//! sum_k |(c_(k-1) + 6 c_k + c_(k+1))/8 - r_k|^2 + sum_k lambda_k |(c_(k-1) - 2 c_k + c_(k+1))/h^2|^2
+//! ```
+//!
+//! with r the log half-way between ticks. lambda is one constant at first and is raised where the acceleration exceeds its limit, until none does.
+//! The normal equations have five diagonals. Attitude is done alike with rotation vectors relative to the smoothed log, where they are small.
+
+use glam::DVec3;
+
+use super::{ResolvedLimits, reference::Reference};
+use crate::trajectory::so3;
+
+/// Time constant of the unconstrained fit, lambda = tau^4: with it, one position quantum of a GNSS log (0.11 m) stays under 2 g.
+const TIME_CONSTANT_S: f64 = 0.05;
+/// Share of the acceleration limit planned with; the rest absorbs the coupling of rotation axes.
+const PLANNED_SHARE: f64 = 0.97;
+/// Passes after which what is left over is cut by the plant.
+const MOST_PASSES: usize = 20;
+/// Exponent of the excess by which lambda grows in one pass.
+const GROWTH: i32 = 2;
+
+/// Motion near `raw` within the limits, described as a correction of `smoothed`.
+pub(crate) fn planned(raw: &Reference, smoothed: Reference, limits: &ResolvedLimits) -> Reference {
+    let h2 = raw.step_s * raw.step_s;
+    let position = || {
+        let residual: Vec<DVec3> = raw.position_ned_m.iter().zip(&smoothed.position_ned_m).map(|(log, smooth)| *log - *smooth).collect();
+        let second = second_differences(&smoothed.position_ned_m, |from, to| *to - *from);
+        corrections(&residual, &second, limits.max_acceleration_m_s2 * h2, raw.step_s)
+    };
+    let attitude = || {
+        let residual: Vec<DVec3> =
+            raw.ned_from_body.iter().zip(&smoothed.ned_from_body).map(|(log, smooth)| so3::log(smooth.inverse() * *log)).collect();
+        let second = second_differences(&smoothed.ned_from_body, |from, to| so3::log(from.inverse() * *to));
+        corrections(&residual, &second, limits.max_angular_acceleration_rad_s2 * h2, raw.step_s)
+    };
+    let (shifts, turns) = rayon::join(position, attitude);
+    Reference {
+        step_s: smoothed.step_s,
+        position_ned_m: smoothed.position_ned_m.iter().zip(&shifts).map(|(at, shift)| *at + *shift).collect(),
+        ned_from_body: smoothed.ned_from_body.iter().zip(&turns).map(|(at, turn)| (*at * so3::exp(*turn)).normalize()).collect(),
+    }
+}
+
+/// `difference(k, k+1) - difference(k-1, k)` for inner k, zero at both ends.
+fn second_differences<T>(values: &[T], difference: impl Fn(&T, &T) -> DVec3) -> Vec<DVec3> {
+    let mut second = vec![DVec3::ZERO; values.len()];
+    let mut before = None;
+    for (k, pair) in values.windows(2).enumerate() {
+        let after = difference(&pair[0], &pair[1]);
+        if let Some(before) = before {
+            second[k] = after - before;
+        }
+        before = Some(after);
+    }
+    second
+}
+
+/// Corrections d of a smooth base so that base + d is near the log: `residual` = log - base, `second` = second differences of the base,
+/// `limit` on the second differences of the sum.
+fn corrections(residual: &[DVec3], second: &[DVec3], limit: f64, step_s: f64) -> Vec<DVec3> {
+    let count = residual.len();
+    let mut weights = vec![(TIME_CONSTANT_S / step_s).powi(4); count];
+    let mut fit = BandedFit::new(count);
+    let planned_limit = PLANNED_SHARE * limit;
+    for _ in 0..MOST_PASSES {
+        fit.solve(residual, second, &weights);
+        let mut within = true;
+        for k in 1..count.saturating_sub(1) {
+            let sum = second[k] + fit.solution[k - 1] - 2.0 * fit.solution[k] + fit.solution[k + 1];
+            let excess2 = sum.length_squared() / (planned_limit * planned_limit);
+            if excess2 > 1.0 {
+                within &= excess2 < (1.0 / (PLANNED_SHARE * PLANNED_SHARE));
+                weights[k] *= excess2.powi(GROWTH);
+            }
+        }
+        if within {
+            break;
+        }
+    }
+    fit.solution
+}
+
+/// Least squares with five diagonals, solved by L D L^T; reused between passes.
+struct BandedFit {
+    diagonal: Vec<f64>,
+    first: Vec<f64>,
+    second: Vec<f64>,
+    solution: Vec<DVec3>,
+}
+
+impl BandedFit {
+    fn new(count: usize) -> Self {
+        Self { diagonal: vec![0.0; count], first: vec![0.0; count], second: vec![0.0; count], solution: vec![DVec3::ZERO; count] }
+    }
+
+    /// Adds `weight |stencil . d - value|^2` centred at `k`.
+    fn add(&mut self, k: usize, stencil: [f64; 3], weight: f64, value: DVec3) {
+        let [a, b, c] = stencil;
+        self.diagonal[k - 1] += weight * a * a;
+        self.diagonal[k] += weight * b * b;
+        self.diagonal[k + 1] += weight * c * c;
+        self.first[k] += weight * a * b;
+        self.first[k + 1] += weight * b * c;
+        self.second[k + 1] += weight * a * c;
+        self.solution[k - 1] += value * (weight * a);
+        self.solution[k] += value * (weight * b);
+        self.solution[k + 1] += value * (weight * c);
+    }
+
+    fn solve(&mut self, residual: &[DVec3], second: &[DVec3], weights: &[f64]) {
+        self.assemble(residual, second, weights);
+        let count = self.diagonal.len();
+        // In place: `first[i]`, `second[i]` become L(i, i-1), L(i, i-2).
+        for i in 0..count {
+            if i >= 2 {
+                let below = self.second[i];
+                self.second[i] = below / self.diagonal[i - 2];
+                self.diagonal[i] -= self.second[i] * below;
+                self.first[i] -= below * self.first[i - 1];
+                self.solution[i] = self.solution[i] - self.second[i] * self.solution[i - 2];
+            }
+            if i >= 1 {
+                let below = self.first[i];
+                self.first[i] = below / self.diagonal[i - 1];
+                self.diagonal[i] -= self.first[i] * below;
+                self.solution[i] = self.solution[i] - self.first[i] * self.solution[i - 1];
+            }
+        }
+        for i in (0..count).rev() {
+            let mut value = self.solution[i] / self.diagonal[i];
+            if i + 1 < count {
+                value -= self.first[i + 1] * self.solution[i + 1];
+            }
+            if i + 2 < count {
+                value -= self.second[i + 2] * self.solution[i + 2];
+            }
+            self.solution[i] = value;
+        }
+    }
+
+    fn assemble(&mut self, residual: &[DVec3], second: &[DVec3], weights: &[f64]) {
+        let count = residual.len();
+        self.diagonal.fill(0.0);
+        self.first.fill(0.0);
+        self.second.fill(0.0);
+        self.solution.fill(DVec3::ZERO);
+        for k in [0, count - 1] {
+            self.diagonal[k] += 1.0;
+            self.solution[k] += residual[k];
+        }
+        for k in 1..count.saturating_sub(1) {
+            // The base's own value of the spline half-way between ticks is base + second/8.
+            self.add(k, [0.125, 0.75, 0.125], 1.0, residual[k] - 0.125 * second[k]);
+            self.add(k, [1.0, -2.0, 1.0], weights[k], -second[k]);
+        }
+    }
+}
