@@ -35,16 +35,14 @@ struct Frame {
     frame_number: u32,
     // 1: one luminance value for all three channels.
     mono: u32,
+    // Depth difference in inverse metres times this is a parallax in ideal pixels over the exposure.
+    exposure_travel_px_m: f32,
+    pad0: f32,
     // Key camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
     ned_from_key_z: vec4<f32>,
-    // Depth difference in inverse metres times this is a parallax in ideal pixels over the exposure.
-    exposure_travel_px_m: f32,
-    pad0: f32,
-    pad1: f32,
-    pad2: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,1 +1,368 @@
-//! (being written)
+//! The frame plan: which passes a frame needs, how large, how many samples, and what is skipped and why.
+//!
+//! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu crate executes it, and
+//! nothing in it depends on the frame before.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+use serde::Serialize;
+
+use crate::{
+    camera::{CameraError, CameraModel, ZoomTable},
+    frame::RowRecord,
+    mount::CameraPath,
+    pose::CameraPose,
+    scenario::{Channel, Solver},
+    scene::Scene,
+    sequence::Sequence,
+    shutter::{LinesAxis, Shutter, ShutterError},
+    temporal::IdealGeometry,
+};
+
+mod bounds;
+mod describe;
+mod lines;
+mod motion;
+
+pub use bounds::LensReach;
+pub use describe::PlanSummary;
+pub use lines::{LinePoses, line_poses, row_records};
+
+/// Nearest distance that the ideal frame can show, metres.
+pub const NEAR_M: f64 = 0.05;
+
+/// Errors of planning.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The camera cannot be used.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// The shutter cannot be used.
+    #[error(transparent)]
+    Shutter(#[from] ShutterError),
+    /// No pixel has a pre-image.
+    #[error("no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)")]
+    NoRay,
+    /// The ideal frame would be too large.
+    #[error(
+        "frame {frame} needs an ideal frame of {width}x{height} px, more than {limit} px a side: the field of view is too wide for a flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view"
+    )]
+    IdealTooLarge {
+        /// Frame number.
+        frame: u64,
+        /// Needed width.
+        width: u64,
+        /// Needed height.
+        height: u64,
+        /// Largest side.
+        limit: u32,
+    },
+}
+
+/// How an output pixel gets its ideal ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayStage {
+    /// Closed form, no map.
+    Pinhole,
+    /// A lens map, computed once per lens and zoom value.
+    LensMap,
+}
+
+/// How a line's own instant is taken back to the ideal frame's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TemporalStage {
+    /// Nothing moves within the frame.
+    Identity,
+    /// Rotation only.
+    Rotation,
+    /// Relative pose and depth.
+    Reproject {
+        /// Depth look-ups.
+        iterations: u32,
+    },
+}
+
+/// Motion blur.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BlurStage {
+    /// Exactly solved poses over the exposure.
+    pub nodes: u32,
+    /// Samples a pixel of path (up to 16 px; one a pixel beyond).
+    pub samples_per_px: f64,
+    /// Cap of the samples between two nodes.
+    pub max_samples: u32,
+}
+
+/// What moves within the frame: bounds that the choices rest on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Motion {
+    /// Nearest surface in view of the key camera, planar depth, a lower bound, metres; infinite with nothing in view.
+    pub nearest_m: f64,
+    /// Farthest the optical centre gets from the key position in the frame's window, metres.
+    pub travel_m: f64,
+    /// Largest rotation from the key attitude, radians.
+    pub rotation_rad: f64,
+    /// Bound on the parallax of any pixel, ideal pixels.
+    pub parallax_px: f64,
+    /// Bound on the displacement by rotation, ideal pixels.
+    pub rotation_px: f64,
+    /// Longest blur path found, ideal pixels.
+    pub blur_px: f64,
+    /// Bound on how far a straight path misses the curved one, ideal pixels.
+    pub blur_sagitta_px: f64,
+    /// Parallax over the exposure for one inverse metre of depth difference, ideal pixels times metres.
+    pub exposure_travel_px_m: f64,
+}
+
+/// Work that this frame does not need.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Skip {
+    /// What is left out.
+    pub what: &'static str,
+    /// Why nothing is lost.
+    pub reason: String,
+}
+
+/// Everything that rendering one frame takes.
+#[derive(Clone, Debug)]
+pub struct FramePlan {
+    /// Frame number.
+    pub frame: u64,
+    /// Stamp t_i, path time, seconds.
+    pub stamp_s: f64,
+    /// First and last instant that the frame sees, path time, seconds.
+    pub window_s: [f64; 2],
+    /// Whether the window reaches outside the log.
+    pub extrapolated: bool,
+    /// Zoom value, for a zoom lens.
+    pub zoom: Option<f64>,
+    /// The output camera at this zoom.
+    pub camera: Arc<CameraModel>,
+    /// Row timing.
+    pub shutter: Shutter,
+    /// Instant of the ideal frame, path time, seconds.
+    pub key_s: f64,
+    /// Its pose.
+    pub key_pose: CameraPose,
+    /// Its pixels.
+    pub ideal: IdealGeometry,
+    /// Lens inverse.
+    pub ray: RayStage,
+    /// Temporal inverse.
+    pub temporal: TemporalStage,
+    /// Gather; `None` is one instant.
+    pub blur: Option<BlurStage>,
+    /// Most footprint taps an axis.
+    pub max_taps: u32,
+    /// Whether depth and coordinates are wanted beside the picture.
+    pub truth: bool,
+    /// What the choices rest on.
+    pub motion: Motion,
+    /// What is not done.
+    pub skipped: Vec<Skip>,
+}
+
+impl FramePlan {
+    /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.
+    #[must_use]
+    pub fn tangents(&self) -> [f64; 4] {
+        self.ideal.tangents()
+    }
+}
+
+/// Plans frames of one sequence; keeps what depends on the lens alone.
+#[derive(Debug)]
+pub struct Planner {
+    sequence: Arc<Sequence>,
+    shutter: Shutter,
+    zoom: Option<ZoomTable>,
+    fixed: Option<Arc<LensReach>>,
+    truth: bool,
+    max_side_px: u32,
+}
+
+impl Planner {
+    /// Prepares for the frames of `sequence`; `max_side_px` is the largest texture side that the renderer has.
+    ///
+    /// # Errors
+    /// A camera or shutter that cannot be used.
+    pub fn new(sequence: Arc<Sequence>, channels: &[Channel], max_side_px: u32) -> Result<Self, PlanError> {
+        let camera = &sequence.scenario.camera;
+        let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
+        let zoom = ZoomTable::from_spec(camera)?;
+        let fixed = match zoom {
+            Some(_) => None,
+            None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
+        };
+        let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
+        Ok(Self { sequence, shutter, zoom, fixed, truth, max_side_px })
+    }
+
+    /// The sequence.
+    #[must_use]
+    pub fn sequence(&self) -> &Arc<Sequence> {
+        &self.sequence
+    }
+
+    /// Whether depth and coordinates are wanted.
+    #[must_use]
+    pub fn wants_truth(&self) -> bool {
+        self.truth
+    }
+
+    /// Calibration table of a zoom lens.
+    #[must_use]
+    pub fn zoom_table(&self) -> Option<&ZoomTable> {
+        self.zoom.as_ref()
+    }
+
+    /// Stamp of a frame, path time, seconds: `start + (i + phase) / fps`.
+    #[must_use]
+    pub fn stamp_s(&self, frame: u64) -> f64 {
+        let camera = &self.sequence.scenario.camera;
+        self.sequence.start_s + (frame as f64 + camera.phase) / camera.fps
+    }
+
+    /// The plan of one frame.
+    ///
+    /// # Errors
+    /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
+    pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        let stamp_s = self.stamp_s(frame);
+        let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
+        let reach = match (&self.fixed, &self.zoom, zoom) {
+            (Some(reach), ..) => reach.clone(),
+            (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
+            _ => return Err(PlanError::NoRay),
+        };
+        let (first, last) = self.shutter.window_s();
+        let window_s = [stamp_s + first, stamp_s + last];
+        let span_s = self.sequence.path.span_s();
+        let key_s = 0.5 * (window_s[0] + window_s[1]);
+        let quality = &self.sequence.scenario.quality;
+        let scene = &self.sequence.scene;
+        let path = &*self.sequence.path;
+        let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene);
+        if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
+            let [width, height] = ideal.size_px.map(u64::from);
+            return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
+        }
+        let key_pose = path.pose(key_s);
+        let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
+        let mut skipped = Vec::new();
+        let ray = ray_stage(&reach, &mut skipped);
+        let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
+        let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+        self.note_static_skips(&mut skipped, temporal);
+        Ok(FramePlan {
+            frame,
+            stamp_s,
+            window_s,
+            extrapolated: window_s[0] < span_s.0 || window_s[1] > span_s.1,
+            zoom,
+            camera: reach.camera.clone(),
+            shutter: self.shutter,
+            key_s,
+            key_pose,
+            ideal,
+            ray,
+            temporal,
+            blur,
+            max_taps: quality.footprint_taps.value().unwrap_or(4).max(1),
+            truth: self.truth,
+            motion,
+            skipped,
+        })
+    }
+
+    /// What the scenario as a whole makes unnecessary.
+    fn note_static_skips(&self, skipped: &mut Vec<Skip>, temporal: TemporalStage) {
+        let photometric = &self.sequence.scenario.camera.photometric;
+        let mut skip = |what, reason: &str| skipped.push(Skip { what, reason: reason.into() });
+        if photometric.noise_sigma <= 0.0 {
+            skip("noise", "camera.photometric.noise_sigma is 0");
+        }
+        if self.sequence.vignette.is_none() {
+            skip("vignette map", "camera.photometric.vignette is not set");
+        }
+        if !self.truth {
+            skip("depth and coordinates", "neither is among the output channels");
+            if !matches!(temporal, TemporalStage::Reproject { .. }) {
+                skip("depth read by the reverse pipeline", "no stage of this frame uses it");
+            }
+        }
+        if self.sequence.scene.fog_visibility_m.is_none() {
+            skip("fog", "scene.fog_visibility_m is not set");
+        }
+    }
+
+    /// Time, pose and velocity of each line of a frame.
+    #[must_use]
+    pub fn rows(&self, plan: &FramePlan) -> Vec<RowRecord> {
+        row_records(plan, &self.sequence.path, self.sequence.epoch_ns)
+    }
+}
+
+fn ray_stage(reach: &LensReach, skipped: &mut Vec<Skip>) -> RayStage {
+    if reach.camera.lens.is_identity() {
+        skipped.push(Skip { what: "lens map", reason: "the camera has no lens distortion".into() });
+        RayStage::Pinhole
+    } else {
+        RayStage::LensMap
+    }
+}
+
+/// Zoom at a time: linear between rows, held outside.
+fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
+    let after = track.partition_point(|row| row.0 <= t_s);
+    match (after.checked_sub(1).and_then(|i| track.get(i)), track.get(after)) {
+        (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (t_s - a.0) / (b.0 - a.0),
+        (Some(only), None) | (None, Some(only)) => only.1,
+        (None, None) => 1.0,
+    }
+}
+
+impl IdealGeometry {
+    /// `[u_min, u_max, v_min, v_max]` of the pixel area.
+    #[must_use]
+    pub fn tangents(&self) -> [f64; 4] {
+        let size = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1]));
+        let low = (DVec2::splat(-0.5) - self.principal_px) / self.focal_px;
+        let high = (size - 0.5 - self.principal_px) / self.focal_px;
+        [low.x, high.x, low.y, high.y]
+    }
+}
+
+/// Whether the solver asked for may be chosen at all: only `reproject` is there, by name or by `auto`.
+#[must_use]
+pub fn solver_name(solver: crate::scenario::Auto<Solver>) -> &'static str {
+    match solver.value() {
+        None | Some(Solver::Reproject) => "reproject",
+    }
+}
+
+/// Lower bound of the planar depth of anything in view, metres; infinite with nothing in view.
+fn nearest_m(scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> f64 {
+    let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
+    let terrain = scene.terrain.as_ref().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
+    let meshes = scene.meshes.iter().map(|mesh| mesh.min_distance_m(pose.position_ned_m)).fold(f64::INFINITY, f64::min);
+    // Slant range to planar depth by the widest ray; the camera may come closer within the window.
+    ((terrain.min(meshes) - travel_m) / (1.0 + r2).sqrt()).max(2.0 * NEAR_M)
+}
+
+/// Line axis and the number of pose-table fields (2 where sideways readout meets interlacing).
+#[must_use]
+pub fn table_shape(shutter: &Shutter) -> (LinesAxis, u32, u32) {
+    let axis = shutter.lines_axis();
+    let fields = if axis == LinesAxis::Columns && shutter.interlace_s() > 0.0 { 2 } else { 1 };
+    (axis, shutter.lines(), fields)
+}
+
+/// Farthest the optical centre gets from `key_s`'s position over the window, sampled at 17 instants plus 2 per vibration period.
+fn travel_m(path: &CameraPath, window_s: [f64; 2], key_s: f64) -> f64 {
+    let key = path.pose(key_s).position_ned_m;
+    motion::instants(path, window_s).map(|t| path.pose(t).position_ned_m.distance(key)).fold(0.0, f64::max)
+}

@@ -1,9 +1,24 @@
 //! The ideal render and the reverse pipeline on wgpu.
+//!
+//! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) -> layout (mirrors of shader
+//! structs) -> scene upload -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back).
+//! The engine executes [`camsim_core::plan::FramePlan`]s and decides nothing itself.
 
 #![warn(missing_docs)]
 
-pub mod reverse {
-    //! The reverse pipeline: output pixel back to ideal frame, one file per stage.
+pub mod context;
 
-    pub mod lens_inverse;
-}
+pub mod shaders;
+
+pub mod layout;
+
+pub mod upload;
+
+pub mod ideal;
+
+pub mod reverse;
+
+pub mod engine;
+
+pub use context::{AdapterChoice, GpuContext, GpuError};
+pub use engine::{Engine, RenderError};

@@ -60,6 +60,19 @@ impl Mesh {
         }
     }
 
+    /// Lower bound of the distance from a point to the mesh, metres: that of its bounding box.
+    #[must_use]
+    pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
+        let mut low = DVec3::INFINITY;
+        let mut high = DVec3::NEG_INFINITY;
+        for vertex in 0..self.vertices.len() as u32 {
+            let at = self.position_ned_m(vertex);
+            low = low.min(at);
+            high = high.max(at);
+        }
+        if self.vertices.is_empty() { f64::INFINITY } else { position_ned_m.distance(position_ned_m.clamp(low, high)) }
+    }
+
     /// NED position of a vertex, metres.
     pub fn position_ned_m(&self, vertex: u32) -> DVec3 {
         self.origin_ned_m + glam::Vec3::from(self.vertices[vertex as usize].position_m).as_dvec3()

@@ -1,0 +1,123 @@
+//! The plan as text and as JSON, for `camsim explain`.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{BlurStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
+
+/// The plan's figures, ready to serialise.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlanSummary<'a> {
+    /// Frame number.
+    pub frame: u64,
+    /// Stamp, path time, seconds.
+    pub stamp_s: f64,
+    /// First and last instant seen, path time, seconds.
+    pub window_s: [f64; 2],
+    /// Whether that reaches outside the log.
+    pub extrapolated: bool,
+    /// Zoom value, for a zoom lens.
+    pub zoom: Option<f64>,
+    /// Output size.
+    pub size_px: [u32; 2],
+    /// Ideal frame size.
+    pub ideal_size_px: [u32; 2],
+    /// Ideal focal lengths.
+    pub ideal_focal_px: [f64; 2],
+    /// Ideal principal point.
+    pub ideal_principal_px: [f64; 2],
+    /// Instant of the ideal frame, path time, seconds.
+    pub key_s: f64,
+    /// Passes in order.
+    pub passes: Vec<String>,
+    /// Lens inverse.
+    pub ray: RayStage,
+    /// Temporal inverse.
+    pub temporal: TemporalStage,
+    /// Gather.
+    pub blur: Option<BlurStage>,
+    /// Most footprint taps an axis.
+    pub max_footprint_taps: u32,
+    /// Bounds behind the choices.
+    pub motion: Motion,
+    /// What is not done.
+    pub skipped: &'a [Skip],
+}
+
+impl FramePlan {
+    /// Names of the passes, in order.
+    #[must_use]
+    pub fn passes(&self) -> Vec<String> {
+        let [width, height] = self.ideal.size_px;
+        let mut passes = Vec::new();
+        if self.ray == RayStage::LensMap {
+            passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
+        }
+        passes.push(format!("ideal: {width}x{height} px rgba16float + depth32float (reversed)"));
+        let ray = if self.ray == RayStage::LensMap { "lens map" } else { "pinhole ray" };
+        let temporal = match self.temporal {
+            TemporalStage::Identity => "no motion".to_owned(),
+            TemporalStage::Rotation => "rotation per line".to_owned(),
+            TemporalStage::Reproject { iterations } => format!("reproject per line, {iterations} depth look-ups"),
+        };
+        let gather = match self.blur {
+            None => "sharp".to_owned(),
+            Some(blur) => format!("blur with {} nodes, {} samples a px", blur.nodes, blur.samples_per_px),
+        };
+        let truth = if self.truth { ", depth and coordinates" } else { "" };
+        passes.push(format!("reverse: {ray} -> {temporal} -> {gather} -> photometric{truth}"));
+        passes.push("readback".to_owned());
+        passes
+    }
+
+    /// The plan's figures.
+    #[must_use]
+    pub fn summary(&self) -> PlanSummary<'_> {
+        PlanSummary {
+            frame: self.frame,
+            stamp_s: self.stamp_s,
+            window_s: self.window_s,
+            extrapolated: self.extrapolated,
+            zoom: self.zoom,
+            size_px: self.camera.size_px,
+            ideal_size_px: self.ideal.size_px,
+            ideal_focal_px: self.ideal.focal_px.to_array(),
+            ideal_principal_px: self.ideal.principal_px.to_array(),
+            key_s: self.key_s,
+            passes: self.passes(),
+            ray: self.ray,
+            temporal: self.temporal,
+            blur: self.blur,
+            max_footprint_taps: self.max_taps,
+            motion: self.motion,
+            skipped: &self.skipped,
+        }
+    }
+}
+
+impl fmt::Display for FramePlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Motion { nearest_m, travel_m, rotation_rad, parallax_px, rotation_px, blur_px, blur_sagitta_px, .. } = self.motion;
+        let [width, height] = self.camera.size_px;
+        writeln!(f, "frame {} at {:.6} s of the flight, {width}x{height} px", self.frame, self.stamp_s)?;
+        let outside = if self.extrapolated { " (reaches outside the log: extrapolated at constant velocity)" } else { "" };
+        writeln!(f, "  sees {:.6} .. {:.6} s{outside}", self.window_s[0], self.window_s[1])?;
+        if let Some(zoom) = self.zoom {
+            writeln!(f, "  zoom {zoom}")?;
+        }
+        writeln!(f, "motion within the frame")?;
+        writeln!(f, "  travel {travel_m:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away", rotation_rad.to_degrees())?;
+        writeln!(f, "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)")?;
+        writeln!(f, "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px")?;
+        writeln!(f, "passes")?;
+        for pass in self.passes() {
+            writeln!(f, "  {pass}")?;
+        }
+        writeln!(f, "skipped")?;
+        for skip in &self.skipped {
+            writeln!(f, "  {}: {}", skip.what, skip.reason)?;
+        }
+        Ok(())
+    }
+}

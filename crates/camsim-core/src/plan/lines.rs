@@ -1,0 +1,75 @@
+//! Poses of every line of the readout, relative to the key pose, in f64 and then f32.
+
+use glam::{DMat3, DVec3};
+
+use super::{FramePlan, table_shape};
+use crate::{frame::RowRecord, mount::CameraPath, shutter::LinesAxis};
+
+/// Relative poses `x_key = R x_line + t` of a frame: `[field][line][node]`, each three rows of `(R, t)`; with more than one node the
+/// mid-exposure pose follows the nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinePoses {
+    /// Rows of `(R | t)`.
+    pub entries: Vec<[[f32; 4]; 3]>,
+    /// Entries a line.
+    pub stride: u32,
+}
+
+/// The pose table of a frame.
+#[must_use]
+pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
+    let (_, lines, fields) = table_shape(&plan.shutter);
+    let nodes = plan.blur.map_or(1, |blur| blur.nodes);
+    let stride = if nodes == 1 { 1 } else { nodes + 1 };
+    let mut entries = Vec::with_capacity((fields * lines * stride) as usize);
+    for field in 0..fields {
+        for line in 0..lines {
+            let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
+            let mut push = |t_s: f64| {
+                let (rotation, shift) = path.pose(t_s).relative_to(&plan.key_pose);
+                entries.push(rows_of(rotation, shift));
+            };
+            if nodes > 1 {
+                for node in 0..nodes {
+                    push(mid_s + plan.shutter.exposure_s() * (f64::from(node) / f64::from(nodes - 1) - 0.5));
+                }
+            }
+            push(mid_s);
+        }
+    }
+    LinePoses { entries, stride }
+}
+
+/// Time shift of a line of a field: with sideways readout the fields are the even and the odd rows.
+fn line_dt_s(plan: &FramePlan, field: u32, line: u32) -> f64 {
+    match plan.shutter.lines_axis() {
+        LinesAxis::Rows => plan.shutter.dt_line_s(line),
+        LinesAxis::Columns => plan.shutter.dt_pixel_s(line, field),
+    }
+}
+
+fn rows_of(rotation: DMat3, shift: DVec3) -> [[f32; 4]; 3] {
+    std::array::from_fn(|i| {
+        let row = rotation.row(i);
+        [row.x as f32, row.y as f32, row.z as f32, shift[i] as f32]
+    })
+}
+
+/// Time, pose and velocity of every line at its mid-exposure. With sideways readout and interlacing the records are those of the field
+/// that keeps the exact time.
+#[must_use]
+pub fn row_records(plan: &FramePlan, path: &CameraPath, epoch_ns: i64) -> Vec<RowRecord> {
+    (0..plan.shutter.lines())
+        .map(|row| {
+            let t_s = plan.stamp_s + plan.shutter.dt_line_s(row);
+            let pose = path.pose(t_s);
+            RowRecord {
+                row,
+                t_mid_ns: epoch_ns.saturating_add((t_s * 1e9).round() as i64),
+                position_ned_m: pose.position_ned_m,
+                ned_from_camera: pose.ned_from_camera,
+                velocity_ned_m_s: path.velocity_ned(t_s),
+            }
+        })
+        .collect()
+}

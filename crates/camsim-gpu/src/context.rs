@@ -1,0 +1,169 @@
+//! Adapter and device.
+
+use std::fmt;
+
+/// Errors of the GPU side. Texts name the fix.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// There is nothing to run on.
+    #[error(
+        "no usable graphics adapter found{0}: install a Vulkan driver (on Debian or Ubuntu without a GPU: `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's name from `camsim info`"
+    )]
+    NoAdapter(String),
+    /// The adapter would not give a device.
+    #[error("adapter `{adapter}` gave no device: {reason}")]
+    NoDevice {
+        /// Adapter name.
+        adapter: String,
+        /// What wgpu says.
+        reason: String,
+    },
+    /// The device stopped working.
+    #[error("the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out")]
+    Device(String),
+    /// A picture or table does not fit the adapter.
+    #[error("{what} needs {needed}, but adapter limit {limit_name} is {limit}: {fix}")]
+    TooLarge {
+        /// What does not fit.
+        what: String,
+        /// How much it needs.
+        needed: u64,
+        /// Name of the limit.
+        limit_name: &'static str,
+        /// Its value.
+        limit: u64,
+        /// What to do.
+        fix: &'static str,
+    },
+}
+
+/// Which adapter to use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AdapterChoice {
+    /// `CAMSIM_ADAPTER` (part of a name) if set, else discrete before integrated before software.
+    #[default]
+    Best,
+    /// A software adapter; tests use it so that figures compare between machines.
+    Software,
+}
+
+/// What an adapter is, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AdapterSummary {
+    /// Device name.
+    pub name: String,
+    /// `discrete`, `integrated`, `virtual`, `software` or `other`.
+    pub kind: &'static str,
+    /// Graphics API.
+    pub backend: String,
+    /// Driver name and version.
+    pub driver: String,
+}
+
+impl AdapterSummary {
+    fn of(info: &wgpu::AdapterInfo) -> Self {
+        let kind = match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete",
+            wgpu::DeviceType::IntegratedGpu => "integrated",
+            wgpu::DeviceType::VirtualGpu => "virtual",
+            wgpu::DeviceType::Cpu => "software",
+            wgpu::DeviceType::Other => "other",
+        };
+        let driver = format!("{} {}", info.driver, info.driver_info).trim().to_owned();
+        Self { name: info.name.clone(), kind, backend: format!("{:?}", info.backend), driver }
+    }
+}
+
+impl fmt::Display for AdapterSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, {}, {})", self.name, self.kind, self.backend, self.driver)
+    }
+}
+
+/// Device, queue, and what they run on.
+#[derive(Debug)]
+pub struct GpuContext {
+    /// Logical device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Description of the adapter.
+    pub adapter: AdapterSummary,
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+}
+
+/// All adapters of this machine, the one that would be used first.
+#[must_use]
+pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
+    ranked(choice).iter().map(|adapter| AdapterSummary::of(&adapter.get_info())).collect()
+}
+
+fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
+    let wanted = std::env::var("CAMSIM_ADAPTER").ok().map(|name| name.to_lowercase());
+    let rank = |info: &wgpu::AdapterInfo| match (info.device_type, choice) {
+        (wgpu::DeviceType::Cpu, AdapterChoice::Software) => 0,
+        (wgpu::DeviceType::DiscreteGpu, _) => 1,
+        (wgpu::DeviceType::IntegratedGpu, _) => 2,
+        (wgpu::DeviceType::VirtualGpu, _) => 3,
+        (wgpu::DeviceType::Cpu, _) => 4,
+        (wgpu::DeviceType::Other, _) => 5,
+    };
+    let mut found = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    found.retain(|adapter| {
+        let info = adapter.get_info();
+        let of_kind = choice != AdapterChoice::Software || info.device_type == wgpu::DeviceType::Cpu;
+        let named = wanted.as_ref().is_none_or(|name| info.name.to_lowercase().contains(name));
+        of_kind && named && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+    });
+    found.sort_by_key(|adapter| rank(&adapter.get_info()));
+    found
+}
+
+impl GpuContext {
+    /// Opens the chosen adapter.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses.
+    pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
+        let mut candidates = ranked(choice);
+        if candidates.is_empty() {
+            let named = std::env::var("CAMSIM_ADAPTER").map_or(String::new(), |name| format!(" with CAMSIM_ADAPTER={name}"));
+            return Err(GpuError::NoAdapter(named));
+        }
+        let adapter = candidates.remove(0);
+        let summary = AdapterSummary::of(&adapter.get_info());
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("camsim"),
+            required_features: wgpu::Features::empty(),
+            required_limits: adapter.limits(),
+            experimental_features: wgpu::ExperimentalFeatures::disabled(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            trace: wgpu::Trace::Off,
+        });
+        let (device, queue) =
+            pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
+        Ok(Self { device, queue, adapter: summary })
+    }
+
+    /// Largest side of a texture.
+    #[must_use]
+    pub fn max_side_px(&self) -> u32 {
+        self.device.limits().max_texture_dimension_2d
+    }
+
+    /// Refuses what does not fit one storage buffer.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub fn check_storage(&self, what: &str, bytes: u64, fix: &'static str) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(GpuError::TooLarge { what: what.into(), needed: bytes, limit_name: "max_storage_buffer_binding_size", limit, fix })
+    }
+}

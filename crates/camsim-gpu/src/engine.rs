@@ -1,0 +1,502 @@
+//! The engine: executes frame plans, keeps two frames in flight, reads back.
+
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex},
+};
+
+use camsim_core::{
+    frame::RenderedFrame,
+    noise::tail_table,
+    photometric::vignette_weights,
+    plan::{FramePlan, PlanError, Planner, RayStage, line_poses},
+    pose::CameraPose,
+    scenario::Channel,
+    scene::LodSelection,
+    sequence::Sequence,
+    temporal::IdealGeometry,
+};
+use wgpu::util::DeviceExt;
+
+use crate::{
+    context::{AdapterChoice, GpuContext, GpuError},
+    ideal::{IdealPass, IdealSlot, IdealTarget},
+    layout::{FrameUniforms, Truth},
+    reverse::{PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
+    shaders::ComposeError,
+    upload::SceneBuffers,
+};
+
+/// Frames that the device works on while the host reads an older one.
+const FRAMES_IN_FLIGHT: usize = 2;
+/// Ideal targets of different size that are kept.
+const MAX_TARGETS: usize = 4;
+
+/// Errors of rendering; `E` is the sink's own.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError<E: std::error::Error + 'static> {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// Planning.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The shader files.
+    #[error(transparent)]
+    Shader(#[from] ComposeError),
+    /// Whoever takes the frames.
+    #[error(transparent)]
+    Sink(E),
+}
+
+/// The opened device.
+#[derive(Debug)]
+pub struct Engine {
+    gpu: GpuContext,
+    fault: Arc<Mutex<Option<String>>>,
+}
+
+impl Engine {
+    /// Opens an adapter.
+    ///
+    /// # Errors
+    /// No usable adapter.
+    pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
+        let gpu = GpuContext::new(choice)?;
+        let fault = Arc::new(Mutex::new(None));
+        let note = |fault: &Arc<Mutex<Option<String>>>, text: String| {
+            if let Ok(mut first) = fault.lock() {
+                first.get_or_insert(text);
+            }
+        };
+        let for_errors = fault.clone();
+        gpu.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| note(&for_errors, error.to_string())));
+        let for_loss = fault.clone();
+        gpu.device.set_device_lost_callback(move |reason, text| {
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                note(&for_loss, text);
+            }
+        });
+        Ok(Self { gpu, fault })
+    }
+
+    /// Device and adapter.
+    #[must_use]
+    pub fn gpu(&self) -> &GpuContext {
+        &self.gpu
+    }
+
+    /// Uploads a sequence and prepares for its frames.
+    ///
+    /// # Errors
+    /// What the adapter cannot hold, a camera that cannot be used.
+    pub fn session<E: std::error::Error + 'static>(&self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<Session<'_>, RenderError<E>> {
+        let gpu = &self.gpu;
+        let planner = Planner::new(sequence.clone(), channels, gpu.max_side_px())?;
+        let pixels = u64::from(sequence.scenario.camera.size_px[0]) * u64::from(sequence.scenario.camera.size_px[1]);
+        gpu.check_storage("the output frame", 32 * pixels, "reduce camera.size_px")?;
+        let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
+        let ideal_pass = IdealPass::new(gpu)?;
+        let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
+        let camera = &sequence.scenario.camera;
+        let weights = match &sequence.vignette {
+            Some(map) => vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds),
+            None => vec![1.0],
+        };
+        let storage = |label, values: &[f32]| {
+            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents: bytemuck::cast_slice(values),
+                usage: wgpu::BufferUsages::STORAGE,
+            })
+        };
+        let session = Session {
+            vignette: storage("camsim.vignette", &weights),
+            noise_table: storage("camsim.noise_table", &tail_table()),
+            ideal_pass,
+            reverse_pass: ReversePass::new(gpu),
+            lens_pass: None,
+            lens_map: None,
+            zoom_maps: HashMap::new(),
+            targets: Vec::new(),
+            drawn: None,
+            slots,
+            buffers,
+            planner,
+            engine: self,
+            coords_phase: 0.0,
+        };
+        self.check()?;
+        Ok(session)
+    }
+
+    fn check(&self) -> Result<(), GpuError> {
+        match self.fault.lock().ok().and_then(|fault| fault.clone()) {
+            Some(text) => Err(GpuError::Device(text)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What was drawn last: the same again need not be drawn.
+#[derive(Debug, PartialEq)]
+struct Drawn {
+    pose: CameraPose,
+    ideal: IdealGeometry,
+    target: usize,
+    lod: LodSelection,
+}
+
+/// One sequence on the device.
+#[derive(Debug)]
+pub struct Session<'a> {
+    engine: &'a Engine,
+    planner: Planner,
+    buffers: SceneBuffers,
+    ideal_pass: IdealPass,
+    reverse_pass: ReversePass,
+    lens_pass: Option<LensInversePass>,
+    /// Current lens map, by the bits of its zoom value.
+    lens_map: Option<(u64, wgpu::Texture)>,
+    /// Maps of the zoom table's entries: starts for those in between.
+    zoom_maps: HashMap<usize, wgpu::Texture>,
+    targets: Vec<IdealTarget>,
+    drawn: Option<Drawn>,
+    slots: Vec<Slot>,
+    vignette: wgpu::Buffer,
+    noise_table: wgpu::Buffer,
+    coords_phase: f32,
+}
+
+/// Buffers of one frame in flight.
+#[derive(Debug)]
+struct Slot {
+    ideal: IdealSlot,
+    frame: wgpu::Buffer,
+    poses: wgpu::Buffer,
+    color: Output,
+    truth: Option<Output>,
+}
+
+/// A buffer that the device writes, and its copy that the host reads.
+#[derive(Debug)]
+struct Output {
+    on_device: wgpu::Buffer,
+    on_host: wgpu::Buffer,
+}
+
+/// A submitted frame.
+struct InFlight {
+    slot: usize,
+    plan: FramePlan,
+    submission: wgpu::SubmissionIndex,
+    lod: LodSelection,
+}
+
+/// A finished frame with the plan it was made by.
+#[derive(Debug)]
+pub struct Finished {
+    /// The pictures.
+    pub frame: RenderedFrame,
+    /// The plan.
+    pub plan: FramePlan,
+    /// The terrain's level of detail.
+    pub lod: LodSelection,
+}
+
+impl Output {
+    fn new(gpu: &GpuContext, label: &str, size: u64) -> Self {
+        let create =
+            |usage| gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        Self {
+            on_device: create(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
+            on_host: create(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+        }
+    }
+
+    fn copy(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_buffer_to_buffer(&self.on_device, 0, &self.on_host, 0, self.on_host.size());
+    }
+
+    fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
+        let view = self.on_host.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
+        let values = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        self.on_host.unmap();
+        Ok(values)
+    }
+}
+
+impl Slot {
+    fn new(gpu: &GpuContext, ideal_pass: &IdealPass, sequence: &Sequence, buffers: &SceneBuffers, truth: bool) -> Self {
+        let [width, height] = sequence.scenario.camera.size_px.map(u64::from);
+        let frame = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camsim.frame"),
+            size: size_of::<FrameUniforms>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self {
+            ideal: ideal_pass.slot(gpu, &sequence.scene, buffers),
+            frame,
+            poses: pose_buffer(gpu, 48 * width.max(height)),
+            color: Output::new(gpu, "camsim.color", 16 * width * height),
+            truth: truth.then(|| Output::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)),
+        }
+    }
+}
+
+fn pose_buffer(gpu: &GpuContext, size: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.poses"),
+        size,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+impl Session<'_> {
+    /// The planner of this sequence.
+    #[must_use]
+    pub fn planner(&self) -> &Planner {
+        &self.planner
+    }
+
+    /// Picks the instant of the exposure, in [-0.5, 0.5], at which `coords` reports source coordinates (0 = mid-exposure): what the blur
+    /// stage samples can so be checked from outside.
+    pub fn set_coords_phase(&mut self, phase: f32) {
+        self.coords_phase = phase;
+    }
+
+    /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next.
+    ///
+    /// # Errors
+    /// The first fault of planning, device or sink; frames before it have been handed over.
+    pub fn render<E: std::error::Error + 'static>(
+        &mut self,
+        frames: impl IntoIterator<Item = u64>,
+        sink: &mut dyn FnMut(Finished) -> Result<(), E>,
+    ) -> Result<(), RenderError<E>> {
+        let mut waiting: Option<InFlight> = None;
+        let mut slot = 0;
+        for frame in frames {
+            let plan = self.planner.plan(frame)?;
+            let submitted = self.submit(plan, slot).map_err(RenderError::lift)?;
+            slot = (slot + 1) % FRAMES_IN_FLIGHT;
+            if let Some(done) = waiting.replace(submitted) {
+                let finished = self.finish(done)?;
+                sink(finished).map_err(RenderError::Sink)?;
+            }
+        }
+        if let Some(done) = waiting {
+            let finished = self.finish(done)?;
+            sink(finished).map_err(RenderError::Sink)?;
+        }
+        Ok(())
+    }
+
+    /// The ideal frame that the last rendered frame was gathered from: linear R G B A and inverse depth (1/m), row-major. For tests and
+    /// for looking at stages one by one.
+    ///
+    /// # Errors
+    /// Device faults; `None` before the first frame.
+    pub fn read_ideal(&self) -> Result<Option<(IdealGeometry, Vec<f32>, Vec<f32>)>, GpuError> {
+        let Some(drawn) = &self.drawn else { return Ok(None) };
+        let target = &self.targets[drawn.target];
+        let [width, height] = drawn.ideal.size_px;
+        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height, wgpu::TextureAspect::All)?;
+        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height, wgpu::TextureAspect::DepthOnly)?;
+        self.engine.check()?;
+        let near_m = camsim_core::plan::NEAR_M as f32;
+        Ok(Some((drawn.ideal, color.iter().flatten().map(|v| v.to_f32()).collect(), depth.iter().map(|d| d / near_m).collect())))
+    }
+
+    /// Every pass of a frame, in order.
+    fn submit(&mut self, plan: FramePlan, slot: usize) -> Result<InFlight, RenderErrorBase> {
+        let gpu = &self.engine.gpu;
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") });
+        if plan.ray == RayStage::LensMap {
+            self.lens_inverse(&mut encoder, &plan);
+        }
+        self.ideal(&mut encoder, &plan, slot);
+        self.reverse(&mut encoder, &plan, slot)?;
+        let slot_buffers = &self.slots[slot];
+        slot_buffers.color.copy(&mut encoder);
+        if let Some(truth) = &slot_buffers.truth {
+            truth.copy(&mut encoder);
+        }
+        let submission = gpu.queue.submit([encoder.finish()]);
+        for output in [Some(&slot_buffers.color), slot_buffers.truth.as_ref()].into_iter().flatten() {
+            // A failed mapping shows when the range is read.
+            output.on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        }
+        self.engine.check()?;
+        let lod = self.drawn.as_ref().map(|drawn| drawn.lod.clone()).unwrap_or_default();
+        Ok(InFlight { slot, plan, submission, lod })
+    }
+
+    /// Pass 1, only when the lens has changed: the lens map.
+    fn lens_inverse(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan) {
+        let gpu = &self.engine.gpu;
+        let bits = plan.zoom.unwrap_or_default().to_bits();
+        if self.lens_map.as_ref().is_some_and(|(of, _)| *of == bits) {
+            return;
+        }
+        let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(&gpu.device));
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut warm = None;
+        if let (Some(table), Some(zoom)) = (self.planner.zoom_table(), plan.zoom) {
+            let entry = table.nearest(zoom);
+            if let (false, Ok(camera)) = (self.zoom_maps.contains_key(&entry), table.at(table.entries()[entry].at)) {
+                let map = LensInversePass::create_map(&gpu.device, camera.size_px);
+                pass.encode(&gpu.device, encoder, &camera, &view(&map), None);
+                self.zoom_maps.insert(entry, map);
+            }
+            warm = self.zoom_maps.get(&entry).map(view);
+        }
+        let map = match self.lens_map.take() {
+            Some((_, map)) => map,
+            None => LensInversePass::create_map(&gpu.device, plan.camera.size_px),
+        };
+        pass.encode(&gpu.device, encoder, &plan.camera, &view(&map), warm.as_ref());
+        self.lens_map = Some((bits, map));
+    }
+
+    /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
+    fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
+        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal) {
+            return;
+        }
+        let gpu = &self.engine.gpu;
+        let size_px = IdealTarget::size_for(&plan.ideal, gpu.max_side_px());
+        let target = self.targets.iter().position(|target| target.allocated_px == size_px).unwrap_or_else(|| {
+            if self.targets.len() == MAX_TARGETS {
+                self.targets.remove(0);
+            }
+            self.targets.push(IdealTarget::new(gpu, size_px));
+            self.targets.len() - 1
+        });
+        let sequence = self.planner.sequence();
+        let lod = self.ideal_pass.encode(
+            gpu,
+            encoder,
+            &self.slots[slot].ideal,
+            &sequence.scene,
+            &self.buffers,
+            plan,
+            sequence.scenario.quality.max_terrain_error_px,
+            &self.targets[target],
+        );
+        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, target, lod });
+    }
+
+    /// Pass 3: the output frame.
+    fn reverse(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
+        let gpu = &self.engine.gpu;
+        let sequence = self.planner.sequence();
+        let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
+        let table = line_poses(plan, &sequence.path);
+        let bytes: &[u8] = bytemuck::cast_slice(&table.entries);
+        let slot = &mut self.slots[slot];
+        if slot.poses.size() < bytes.len() as u64 {
+            slot.poses = pose_buffer(gpu, bytes.len() as u64);
+        }
+        gpu.queue.write_buffer(&slot.frame, 0, bytemuck::bytes_of(&uniforms));
+        gpu.queue.write_buffer(&slot.poses, 0, bytes);
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let Some(target) = self.drawn.as_ref().map(|drawn| &self.targets[drawn.target]) else { return Ok(()) };
+        let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| view(map)) } else { None };
+        let bindings = ReverseBindings {
+            frame: &slot.frame,
+            noise_table: &self.noise_table,
+            color: &view(&target.color),
+            depth: &view(&target.depth),
+            poses: &slot.poses,
+            vignette: &self.vignette,
+            lens_map: lens_map.as_ref(),
+            out_color: &slot.color.on_device,
+            out_truth: slot.truth.as_ref().map(|truth| &truth.on_device),
+        };
+        self.reverse_pass.encode(gpu, encoder, PipelineKey::of(plan), plan.camera.size_px, &bindings)
+    }
+
+    /// Waits for a frame and takes its pictures.
+    fn finish(&self, done: InFlight) -> Result<Finished, GpuError> {
+        let gpu = &self.engine.gpu;
+        let wait = wgpu::PollType::Wait { submission_index: Some(done.submission), timeout: None };
+        gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
+        self.engine.check()?;
+        let slot = &self.slots[done.slot];
+        let color_rgba = slot.color.read()?;
+        let truth = slot.truth.as_ref().map(Output::read::<Truth>).transpose()?;
+        let plan = done.plan;
+        let size_px = plan.camera.size_px;
+        let frame = RenderedFrame {
+            index: plan.frame,
+            stamp_ns: self.planner.sequence().epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
+            size_px,
+            color_rgba,
+            depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
+            coords: truth.as_ref().map(|truth| coords(truth, &plan)),
+            rows: self.planner.rows(&plan),
+        };
+        Ok(Finished { frame, plan, lod: done.lod })
+    }
+}
+
+/// Errors before a sink is involved.
+type RenderErrorBase = RenderError<std::convert::Infallible>;
+
+impl<E: std::error::Error + 'static> RenderError<E> {
+    fn lift(base: RenderErrorBase) -> Self {
+        match base {
+            RenderError::Gpu(error) => Self::Gpu(error),
+            RenderError::Plan(error) => Self::Plan(error),
+            RenderError::Shader(error) => Self::Shader(error),
+            RenderError::Sink(never) => match never {},
+        }
+    }
+}
+
+fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
+    let width = plan.camera.size_px[0];
+    let dt_s = |i: u32| plan.shutter.dt_pixel_s(i % width, i / width) as f32;
+    truth
+        .iter()
+        .zip(0..)
+        .map(|(t, i)| [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s(i), t.point_ned_m[0], t.point_ned_m[1], t.point_ned_m[2]])
+        .collect()
+}
+
+fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32, aspect: wgpu::TextureAspect) -> Result<Vec<T>, GpuError> {
+    let row = width * size_of::<T>() as u32;
+    let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    // Depth can only be copied whole.
+    let (copy_width, copy_height) = (texture.width(), texture.height());
+    let copy_row = (copy_width * size_of::<T>() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT).max(padded);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.read_texture"),
+        size: u64::from(copy_row) * u64::from(copy_height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
+    encoder.copy_texture_to_buffer(
+        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect },
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },
+        },
+        wgpu::Extent3d { width: copy_width, height: copy_height, depth_or_array_layers: 1 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
+    let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
+    let mut values = Vec::with_capacity((width * height) as usize);
+    for y in 0..height {
+        let start = (y * copy_row) as usize;
+        values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&view[start..start + row as usize]));
+    }
+    Ok(values)
+}

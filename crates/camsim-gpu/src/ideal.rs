@@ -1,0 +1,349 @@
+//! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
+
+use camsim_core::{
+    plan::{FramePlan, NEAR_M},
+    pose::CameraPose,
+    scene::{LodSelection, Scene, select_lod},
+    temporal::IdealGeometry,
+};
+use glam::{DMat3, DVec3};
+
+use crate::{
+    context::GpuContext,
+    layout::{ChunkDraw, IdealCamera},
+    shaders::{self, ComposeError},
+    upload::SceneBuffers,
+};
+
+/// Colour format of the ideal frame.
+pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Depth format of the ideal frame: near / z.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Sizes are rounded up to this, so that a few allocations serve all frames. Depends on the frame alone.
+const SIZE_QUANTUM_PX: u32 = 64;
+/// Distance between the placements of two meshes in their buffer.
+const PLACEMENT_STRIDE: u64 = 256;
+
+/// Textures that an ideal frame is drawn to.
+#[derive(Debug)]
+pub struct IdealTarget {
+    /// Allocated width, height.
+    pub allocated_px: [u32; 2],
+    /// Linear colour.
+    pub color: wgpu::Texture,
+    /// near / z.
+    pub depth: wgpu::Texture,
+}
+
+impl IdealTarget {
+    /// Allocated size for an ideal frame.
+    #[must_use]
+    pub fn size_for(ideal: &IdealGeometry, max_side_px: u32) -> [u32; 2] {
+        ideal.size_px.map(|side| side.next_multiple_of(SIZE_QUANTUM_PX).min(max_side_px))
+    }
+
+    /// Allocates.
+    #[must_use]
+    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2]) -> Self {
+        let texture = |label, format| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d { width: allocated_px[0], height: allocated_px[1], depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        Self { allocated_px, color: texture("camsim.ideal.color", COLOR_FORMAT), depth: texture("camsim.ideal.depth", DEPTH_FORMAT) }
+    }
+}
+
+/// Pipelines of the ideal render.
+#[derive(Debug)]
+pub struct IdealPass {
+    camera_layout: wgpu::BindGroupLayout,
+    terrain_layout: wgpu::BindGroupLayout,
+    mesh_layout: wgpu::BindGroupLayout,
+    terrain: wgpu::RenderPipeline,
+    mesh: wgpu::RenderPipeline,
+}
+
+/// Buffers of one frame in flight, and their bind groups.
+#[derive(Debug)]
+pub struct IdealSlot {
+    camera: wgpu::Buffer,
+    draws: wgpu::Buffer,
+    placements: wgpu::Buffer,
+    camera_group: wgpu::BindGroup,
+    terrain_group: Option<wgpu::BindGroup>,
+    mesh_groups: Vec<wgpu::BindGroup>,
+}
+
+impl IdealPass {
+    /// Compiles the pipelines.
+    ///
+    /// # Errors
+    /// Faults of the shader files.
+    pub fn new(gpu: &GpuContext) -> Result<Self, ComposeError> {
+        let device = &gpu.device;
+        let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+        };
+        let both = wgpu::ShaderStages::VERTEX_FRAGMENT;
+        let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, both, wgpu::BufferBindingType::Uniform)]);
+        let storage = wgpu::BufferBindingType::Storage { read_only: true };
+        let [texture, sampler] = texture_entries();
+        let terrain_layout = layout("camsim.ideal.terrain", &[
+            texture,
+            sampler,
+            buffer_entry(2, wgpu::ShaderStages::VERTEX, storage),
+            buffer_entry(3, wgpu::ShaderStages::VERTEX, storage),
+        ]);
+        let mesh_layout = layout("camsim.ideal.mesh", &[
+            texture,
+            sampler,
+            buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform),
+        ]);
+        let mesh_vertices = wgpu::VertexBufferLayout {
+            array_stride: 20,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
+        };
+        let terrain = pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[])?;
+        let mesh = pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices)])?;
+        Ok(Self { camera_layout, terrain_layout, mesh_layout, terrain, mesh })
+    }
+
+    /// Buffers for one frame in flight of this scene.
+    #[must_use]
+    pub fn slot(&self, gpu: &GpuContext, scene: &Scene, buffers: &SceneBuffers) -> IdealSlot {
+        let create = |label, size: u64, usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size.max(PLACEMENT_STRIDE),
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let chunks = scene.terrain.as_ref().map_or(0, |terrain| terrain.chunks.len());
+        let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
+        let draws = create("camsim.ideal.draws", (chunks * size_of::<ChunkDraw>()) as u64, wgpu::BufferUsages::STORAGE);
+        let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
+        let group = |layout, entries: &[wgpu::BindGroupEntry]| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
+        };
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
+        let sampler = wgpu::BindingResource::Sampler(&buffers.sampler);
+        let terrain_group = buffers.terrain.as_ref().map(|terrain| {
+            group(&self.terrain_layout, &[
+                entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
+                entry(1, sampler.clone()),
+                entry(2, terrain.vertices.as_entire_binding()),
+                entry(3, draws.as_entire_binding()),
+            ])
+        });
+        let mesh_groups = buffers.meshes.iter().zip(0_u64..).map(|(mesh, i)| {
+            let placement = wgpu::BufferBinding { buffer: &placements, offset: i * PLACEMENT_STRIDE, size: wgpu::BufferSize::new(16) };
+            group(&self.mesh_layout, &[
+                entry(0, wgpu::BindingResource::TextureView(&mesh.texture)),
+                entry(1, sampler.clone()),
+                entry(2, wgpu::BindingResource::Buffer(placement)),
+            ])
+        });
+        let mesh_groups = mesh_groups.collect();
+        IdealSlot { camera, draws, placements, camera_group, terrain_group, mesh_groups }
+    }
+
+    /// Records the ideal frame of a plan; returns the level of detail that the terrain got.
+    pub fn encode(
+        &self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        slot: &IdealSlot,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        plan: &FramePlan,
+        max_terrain_error_px: f64,
+        target: &IdealTarget,
+    ) -> LodSelection {
+        let base_ned_m = plan.key_pose.position_ned_m.round();
+        gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(&plan.key_pose, &plan.ideal, base_ned_m, scene)));
+        let focal_px = plan.ideal.focal_px.max_element();
+        let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
+            select_lod(terrain, &plan.key_pose, plan.tangents(), focal_px, max_terrain_error_px)
+        });
+        let color_view = target.color.create_view(&wgpu::TextureViewDescriptor::default());
+        let depth_view = target.depth.create_view(&wgpu::TextureViewDescriptor::default());
+        let [r, g, b] = scene.sky_linear.map(f64::from);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("ideal"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &color_view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &depth_view,
+                // Reversed: 0 is infinitely far.
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            }),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        let [width, height] = plan.ideal.size_px;
+        pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
+        pass.set_scissor_rect(0, 0, width, height);
+        pass.set_bind_group(0, &slot.camera_group, &[]);
+        self.draw_terrain(gpu, &mut pass, slot, scene, buffers, &lod, base_ned_m);
+        self.draw_meshes(gpu, &mut pass, slot, buffers, base_ned_m);
+        lod
+    }
+
+    fn draw_terrain(
+        &self,
+        gpu: &GpuContext,
+        pass: &mut wgpu::RenderPass<'_>,
+        slot: &IdealSlot,
+        scene: &Scene,
+        buffers: &SceneBuffers,
+        lod: &LodSelection,
+        base_ned_m: DVec3,
+    ) {
+        let (Some(terrain), Some(on_device), Some(group)) = (&scene.terrain, &buffers.terrain, &slot.terrain_group) else { return };
+        // Chunks of one level are drawn together; those with voids come last, one by one.
+        let mut order: Vec<_> = lod.draws.iter().collect();
+        order.sort_by_key(|draw| (terrain.chunks[draw.chunk as usize].void_indices.is_some(), draw.level, draw.chunk));
+        let rows: Vec<ChunkDraw> = order
+            .iter()
+            .map(|draw| {
+                let chunk = &terrain.chunks[draw.chunk as usize];
+                let [north, east, south, west] = draw.edge_levels.map(u32::from);
+                ChunkDraw {
+                    centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(),
+                    first_vertex: chunk.first_vertex,
+                    cells: chunk.cells,
+                    levels: u32::from(draw.level) | north << 4 | east << 8 | south << 12 | west << 16,
+                    pad: 0,
+                }
+            })
+            .collect();
+        gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
+        pass.set_pipeline(&self.terrain);
+        pass.set_bind_group(1, group, &[]);
+        pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
+        let mut first = 0;
+        while let Some(draw) = order.get(first) {
+            let chunk = &terrain.chunks[draw.chunk as usize];
+            let (range, last) = match &chunk.void_indices {
+                Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
+                None => {
+                    let same = |d: &&camsim_core::scene::ChunkDraw| d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none();
+                    let count = order[first..].iter().take_while(|d| same(d)).count();
+                    (on_device.levels[draw.level as usize].clone(), first + count)
+                }
+            };
+            pass.draw_indexed(range, 0, first as u32..last as u32);
+            first = last;
+        }
+    }
+
+    fn draw_meshes(&self, gpu: &GpuContext, pass: &mut wgpu::RenderPass<'_>, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
+        if buffers.meshes.is_empty() {
+            return;
+        }
+        pass.set_pipeline(&self.mesh);
+        for ((mesh, group), i) in buffers.meshes.iter().zip(&slot.mesh_groups).zip(0_u64..) {
+            let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
+            gpu.queue.write_buffer(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
+            pass.set_bind_group(1, group, &[]);
+            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+            pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..mesh.count, 0, 0..1);
+        }
+    }
+}
+
+/// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.
+fn ideal_camera(pose: &CameraPose, ideal: &IdealGeometry, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
+    let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
+    let row = |i: usize| camera_from_ned.row(i).as_vec3().extend(0.0).to_array();
+    let [width, height] = ideal.size_px.map(f64::from);
+    let (f, c) = (ideal.focal_px, ideal.principal_px);
+    let fog = scene.fog_visibility_m.map_or(0.0, |visibility_m| 3.912 / visibility_m);
+    let [r, g, b] = scene.sky_linear;
+    IdealCamera {
+        clip_scale: [(2.0 * f.x / width) as f32, (-2.0 * f.y / height) as f32],
+        clip_shift: [(2.0 * (c.x + 0.5) / width - 1.0) as f32, (1.0 - 2.0 * (c.y + 0.5) / height) as f32],
+        camera_from_ned_x: row(0),
+        camera_from_ned_y: row(1),
+        camera_from_ned_z: row(2),
+        camera_from_base_m: (pose.position_ned_m - base_ned_m).as_vec3().extend(0.0).to_array(),
+        sky: [r, g, b, fog as f32],
+        near_m: NEAR_M as f32,
+        ..IdealCamera::default()
+    }
+}
+
+fn buffer_entry(binding: u32, visibility: wgpu::ShaderStages, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
+}
+
+fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
+    let visibility = wgpu::ShaderStages::FRAGMENT;
+    let texture = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    [
+        wgpu::BindGroupLayoutEntry { binding: 0, visibility, ty: texture, count: None },
+        wgpu::BindGroupLayoutEntry { binding: 1, visibility, ty: sampler, count: None },
+    ]
+}
+
+fn pipeline(
+    gpu: &GpuContext,
+    file: &str,
+    layouts: &[&wgpu::BindGroupLayout],
+    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+) -> Result<wgpu::RenderPipeline, ComposeError> {
+    let module = shaders::module(&gpu.device, file, file, &[])?;
+    let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(file),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(file),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState { module: &module, entry_point: Some("vertex"), compilation_options: compilation_options.clone(), buffers },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("fragment"),
+            compilation_options,
+            targets: &[Some(COLOR_FORMAT.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    }))
+}

@@ -1,0 +1,123 @@
+//! `repr(C)` mirrors of the shader structs; a test compares their offsets with naga's reflection.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Mirror of `Frame` in shaders/common/frame.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented in the shader, field by field")]
+pub struct FrameUniforms {
+    pub size_px: [u32; 2],
+    pub ideal_size_px: [u32; 2],
+    pub ideal_focal_px: [f32; 2],
+    pub ideal_principal_px: [f32; 2],
+    pub focal_px: [f32; 2],
+    pub principal_px: [f32; 2],
+    pub near_m: f32,
+    pub nodes: u32,
+    pub line_axis: u32,
+    pub lines: u32,
+    pub fields: u32,
+    pub iterations: u32,
+    pub samples_per_px: f32,
+    pub max_samples: u32,
+    pub max_taps: u32,
+    pub coords_phase: f32,
+    pub light: f32,
+    pub noise_sigma: f32,
+    pub vignette_thresholds: [f32; 2],
+    pub seed: [u32; 2],
+    pub frame_number: u32,
+    pub mono: u32,
+    pub exposure_travel_px_m: f32,
+    pub pad0: f32,
+    pub key_position_ned_m: [f32; 4],
+    pub ned_from_key_x: [f32; 4],
+    pub ned_from_key_y: [f32; 4],
+    pub ned_from_key_z: [f32; 4],
+}
+
+/// Mirror of `IdealCamera` in shaders/ideal/surface.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented in the shader, field by field")]
+pub struct IdealCamera {
+    pub clip_scale: [f32; 2],
+    pub clip_shift: [f32; 2],
+    pub camera_from_ned_x: [f32; 4],
+    pub camera_from_ned_y: [f32; 4],
+    pub camera_from_ned_z: [f32; 4],
+    pub camera_from_base_m: [f32; 4],
+    pub sky: [f32; 4],
+    pub near_m: f32,
+    pub pad0: f32,
+    pub pad1: f32,
+    pub pad2: f32,
+}
+
+/// Mirror of `ChunkDraw` in shaders/ideal/terrain.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented in the shader, field by field")]
+pub struct ChunkDraw {
+    pub centre_from_base_m: [f32; 3],
+    pub first_vertex: u32,
+    pub cells: [u32; 2],
+    pub levels: u32,
+    pub pad: u32,
+}
+
+/// Mirror of `Truth` in shaders/reverse/emit/truth.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented in the shader, field by field")]
+pub struct Truth {
+    pub uv: [f32; 2],
+    pub source_px: [f32; 2],
+    pub point_ned_m: [f32; 3],
+    pub depth_m: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::mem::{offset_of, size_of};
+
+    use super::*;
+    use crate::{reverse, shaders};
+
+    fn members(module: &naga::Module, name: &str) -> (Vec<(String, usize)>, usize) {
+        let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name)).unwrap();
+        let naga::TypeInner::Struct { members, span } = &ty.inner else { panic!("{name} is not a struct") };
+        (members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize)).collect(), *span as usize)
+    }
+
+    macro_rules! assert_mirror {
+        ($module:expr, $name:literal, $mirror:ty, [$($field:ident),* $(,)?]) => {
+            let (found, span) = members($module, $name);
+            let expected = vec![$((stringify!($field).to_owned(), offset_of!($mirror, $field))),*];
+            assert_eq!(found, expected);
+            assert_eq!(span, size_of::<$mirror>(), $name);
+        };
+    }
+
+    #[test]
+    fn structs_are_laid_out_as_in_the_shaders() {
+        let parse = |text: String| naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
+        let key = *reverse::PipelineKey::all().last().unwrap();
+        let module = parse(shaders::compose(reverse::SHADER, &key.slots()).unwrap());
+        assert_mirror!(&module, "Frame", FrameUniforms, [
+            size_px, ideal_size_px, ideal_focal_px, ideal_principal_px, focal_px, principal_px, near_m, nodes, line_axis, lines, fields,
+            iterations, samples_per_px, max_samples, max_taps, coords_phase, light, noise_sigma, vignette_thresholds, seed, frame_number,
+            mono, exposure_travel_px_m, pad0, key_position_ned_m, ned_from_key_x, ned_from_key_y, ned_from_key_z,
+        ]);
+        assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
+        let module = parse(shaders::compose("ideal/terrain.wgsl", &[]).unwrap());
+        assert_mirror!(&module, "IdealCamera", IdealCamera, [
+            clip_scale, clip_shift, camera_from_ned_x, camera_from_ned_y, camera_from_ned_z, camera_from_base_m, sky, near_m, pad0, pad1,
+            pad2,
+        ]);
+        assert_mirror!(&module, "ChunkDraw", ChunkDraw, [centre_from_base_m, first_vertex, cells, levels, pad]);
+    }
+}

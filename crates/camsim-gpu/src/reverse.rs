@@ -1,0 +1,312 @@
+//! The reverse pipeline: output pixel -> lens inverse (map) -> temporal inverse -> gather -> photometric -> output buffer.
+//!
+//! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text. [`PipelineKey::all`] lists
+//! every legal composition.
+
+use std::collections::HashMap;
+
+use camsim_core::{
+    photometric::is_mono,
+    plan::{FramePlan, NEAR_M, RayStage, TemporalStage, table_shape},
+    scenario::Scenario,
+    shutter::LinesAxis,
+};
+use glam::DMat3;
+
+use crate::{
+    context::GpuContext,
+    layout::FrameUniforms,
+    shaders::{self, ComposeError, Slot},
+};
+
+pub mod lens_inverse;
+
+/// The kernel's main file.
+pub const SHADER: &str = "reverse/reverse.wgsl";
+/// Edge of the square workgroups.
+const WORKGROUP_PX: u32 = 8;
+
+/// Temporal inverse without its numbers: numbers go into uniforms, never into a key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "as camsim_core::plan::TemporalStage")]
+pub enum TemporalKind {
+    Identity,
+    Rotation,
+    Reproject,
+}
+
+/// Which stages a kernel is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PipelineKey {
+    /// Lens inverse.
+    pub ray: RayStage,
+    /// Temporal inverse.
+    pub temporal: TemporalKind,
+    /// Exposure.
+    pub blur: bool,
+    /// Depth and coordinates beside the picture.
+    pub truth: bool,
+}
+
+impl PipelineKey {
+    /// The key of a plan.
+    #[must_use]
+    pub fn of(plan: &FramePlan) -> Self {
+        let temporal = match plan.temporal {
+            TemporalStage::Identity => TemporalKind::Identity,
+            TemporalStage::Rotation => TemporalKind::Rotation,
+            TemporalStage::Reproject { .. } => TemporalKind::Reproject,
+        };
+        Self { ray: plan.ray, temporal, blur: plan.blur.is_some(), truth: plan.truth }
+    }
+
+    /// Every key that a plan can have.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let mut keys = Vec::new();
+        for ray in [RayStage::Pinhole, RayStage::LensMap] {
+            for temporal in [TemporalKind::Identity, TemporalKind::Rotation, TemporalKind::Reproject] {
+                for blur in [false, true] {
+                    // Without motion there is no blur.
+                    if blur && temporal == TemporalKind::Identity {
+                        continue;
+                    }
+                    keys.extend([false, true].map(|truth| Self { ray, temporal, blur, truth }));
+                }
+            }
+        }
+        keys
+    }
+
+    /// Fillings of the kernel's slots.
+    #[must_use]
+    pub fn slots(&self) -> [Slot; 4] {
+        let ray = match self.ray {
+            RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
+            RayStage::LensMap => "reverse/ray/map.wgsl",
+        };
+        let temporal = match self.temporal {
+            TemporalKind::Identity => "reverse/temporal_inverse/identity.wgsl",
+            TemporalKind::Rotation => "reverse/temporal_inverse/rotation.wgsl",
+            TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
+        };
+        let gather = if self.blur { "reverse/gather/blur.wgsl" } else { "reverse/gather/sharp.wgsl" };
+        let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
+        [("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("emit", emit)]
+    }
+}
+
+/// What a dispatch reads and writes.
+#[derive(Debug)]
+pub struct ReverseBindings<'a> {
+    /// [`FrameUniforms`].
+    pub frame: &'a wgpu::Buffer,
+    /// Normal quantiles.
+    pub noise_table: &'a wgpu::Buffer,
+    /// Ideal colour.
+    pub color: &'a wgpu::TextureView,
+    /// Ideal depth.
+    pub depth: &'a wgpu::TextureView,
+    /// Relative poses.
+    pub poses: &'a wgpu::Buffer,
+    /// Vignette weights.
+    pub vignette: &'a wgpu::Buffer,
+    /// Lens map, when the key reads one.
+    pub lens_map: Option<&'a wgpu::TextureView>,
+    /// Linear R G B A.
+    pub out_color: &'a wgpu::Buffer,
+    /// Depth and coordinates, when the key writes them.
+    pub out_truth: Option<&'a wgpu::Buffer>,
+}
+
+#[derive(Debug)]
+struct Variant {
+    pipeline: wgpu::ComputePipeline,
+    groups: [Option<wgpu::BindGroupLayout>; 4],
+}
+
+/// Kernels, compiled when first needed.
+#[derive(Debug)]
+pub struct ReversePass {
+    variants: HashMap<PipelineKey, Variant>,
+    sampler: wgpu::Sampler,
+}
+
+impl ReversePass {
+    /// Compiles nothing yet.
+    #[must_use]
+    pub fn new(gpu: &GpuContext) -> Self {
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("camsim.reverse.sampler"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        Self { variants: HashMap::new(), sampler }
+    }
+
+    /// Records the kernel of a plan.
+    ///
+    /// # Errors
+    /// Faults of the shader files.
+    pub fn encode(
+        &mut self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        key: PipelineKey,
+        size_px: [u32; 2],
+        bindings: &ReverseBindings<'_>,
+    ) -> Result<(), ComposeError> {
+        if !self.variants.contains_key(&key) {
+            let variant = Variant::new(gpu, key)?;
+            self.variants.insert(key, variant);
+        }
+        let variant = &self.variants[&key];
+        let groups = variant.bind(gpu, &self.sampler, bindings);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("reverse"), timestamp_writes: None });
+        pass.set_pipeline(&variant.pipeline);
+        for (i, group) in groups.iter().enumerate() {
+            if let Some(group) = group {
+                pass.set_bind_group(i as u32, group, &[]);
+            }
+        }
+        pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
+        Ok(())
+    }
+}
+
+impl Variant {
+    fn new(gpu: &GpuContext, key: PipelineKey) -> Result<Self, ComposeError> {
+        let module = shaders::module(&gpu.device, "camsim.reverse", SHADER, &key.slots())?;
+        let groups = layouts(key).map(|entries| {
+            (!entries.is_empty()).then(|| {
+                gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.reverse"), entries: &entries })
+            })
+        });
+        let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("camsim.reverse"),
+            bind_group_layouts: &groups.each_ref().map(Option::as_ref),
+            immediate_size: 0,
+        });
+        let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("camsim.reverse"),
+            layout: Some(&layout),
+            module: &module,
+            entry_point: Some("reverse"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        Ok(Self { pipeline, groups })
+    }
+
+    fn bind(&self, gpu: &GpuContext, sampler: &wgpu::Sampler, b: &ReverseBindings<'_>) -> [Option<wgpu::BindGroup>; 4] {
+        let view = |view| wgpu::BindingResource::TextureView(view);
+        let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
+            vec![(0, b.frame.as_entire_binding()), (1, b.noise_table.as_entire_binding())],
+            vec![
+                (0, view(b.color)),
+                (1, wgpu::BindingResource::Sampler(sampler)),
+                (2, view(b.depth)),
+                (3, b.poses.as_entire_binding()),
+                (4, b.vignette.as_entire_binding()),
+            ],
+            Vec::new(),
+            vec![(0, b.out_color.as_entire_binding())],
+        ];
+        resources[2].extend(b.lens_map.map(|map| (0, view(map))));
+        resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
+        let mut groups = [const { None }; 4];
+        for (i, resources) in resources.into_iter().enumerate() {
+            groups[i] = self.groups[i].as_ref().map(|layout| {
+                let entries: Vec<_> = resources.into_iter().map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+                gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.reverse"), layout, entries: &entries })
+            });
+        }
+        groups
+    }
+}
+
+fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    let texture = |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
+    let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, storage(true))];
+    let ideal = vec![
+        entry(0, texture(wgpu::TextureSampleType::Float { filterable: true })),
+        entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+        entry(2, texture(wgpu::TextureSampleType::Depth)),
+        entry(3, storage(true)),
+        entry(4, storage(true)),
+    ];
+    let lens = match key.ray {
+        RayStage::Pinhole => Vec::new(),
+        RayStage::LensMap => vec![entry(0, texture(wgpu::TextureSampleType::Float { filterable: false }))],
+    };
+    let mut out = vec![entry(0, storage(false))];
+    if key.truth {
+        out.push(entry(1, storage(false)));
+    }
+    [frame, ideal, lens, out]
+}
+
+/// Uniforms of a frame. `coords_phase` in [-0.5, 0.5] picks the instant of the exposure at which source coordinates are reported.
+#[must_use]
+pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
+    let photometric = &scenario.camera.photometric;
+    let (axis, lines, fields) = table_shape(&plan.shutter);
+    let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
+    let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
+    FrameUniforms {
+        size_px: plan.camera.size_px,
+        ideal_size_px: plan.ideal.size_px,
+        ideal_focal_px: plan.ideal.focal_px.as_vec2().to_array(),
+        ideal_principal_px: plan.ideal.principal_px.as_vec2().to_array(),
+        focal_px: plan.camera.focal_px.as_vec2().to_array(),
+        principal_px: plan.camera.principal_point_px.as_vec2().to_array(),
+        near_m: NEAR_M as f32,
+        nodes: plan.blur.map_or(1, |blur| blur.nodes),
+        line_axis: u32::from(axis == LinesAxis::Columns),
+        lines,
+        fields,
+        iterations: match plan.temporal {
+            TemporalStage::Reproject { iterations } => iterations,
+            _ => 0,
+        },
+        samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px as f32),
+        max_samples: plan.blur.map_or(1, |blur| blur.max_samples),
+        max_taps: plan.max_taps,
+        coords_phase,
+        light: photometric.light as f32,
+        noise_sigma: photometric.noise_sigma as f32,
+        vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
+        seed: [scenario.seed as u32, (scenario.seed >> 32) as u32],
+        frame_number: plan.frame as u32,
+        mono: u32::from(is_mono(photometric.output)),
+        key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),
+        ned_from_key_x: column(0),
+        ned_from_key_y: column(1),
+        ned_from_key_z: column(2),
+        exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
+        ..FrameUniforms::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn every_variant_is_valid_without_any_capability() {
+        let texts = PipelineKey::all().into_iter().map(|key| (format!("{key:?}"), shaders::compose(SHADER, &key.slots()).unwrap()));
+        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
+        for (name, text) in texts.chain(ideal) {
+            let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
+            let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+            validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        }
+        assert_eq!(PipelineKey::all().len(), 20);
+    }
+}

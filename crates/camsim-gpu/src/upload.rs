@@ -1,0 +1,161 @@
+//! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
+
+use camsim_core::scene::{CHUNK_CELLS, Encoding, LEVELS, Mesh, Scene, Terrain, Texture};
+use glam::DVec3;
+use wgpu::util::DeviceExt;
+
+use crate::context::{GpuContext, GpuError};
+
+/// A scene's device resources.
+#[derive(Debug)]
+pub struct SceneBuffers {
+    /// Terrain, if there is any.
+    pub terrain: Option<TerrainBuffers>,
+    /// Meshes in scene order.
+    pub meshes: Vec<MeshBuffers>,
+    /// Trilinear, anisotropic where the adapter can, edges held.
+    pub sampler: wgpu::Sampler,
+}
+
+/// Terrain vertices and the index lists of every level.
+#[derive(Debug)]
+pub struct TerrainBuffers {
+    /// Five floats a vertex.
+    pub vertices: wgpu::Buffer,
+    /// Lattice indices: those of each level, then those of the chunks with voids.
+    pub indices: wgpu::Buffer,
+    /// Index range of each level.
+    pub levels: [std::ops::Range<u32>; LEVELS],
+    /// Offset of the void chunks' own indices.
+    pub void_base: u32,
+    /// Picture on the ground.
+    pub texture: wgpu::TextureView,
+}
+
+/// One mesh.
+#[derive(Debug)]
+pub struct MeshBuffers {
+    /// Positions and texture coordinates.
+    pub vertices: wgpu::Buffer,
+    /// Triangle list.
+    pub indices: wgpu::Buffer,
+    /// Number of indices.
+    pub count: u32,
+    /// Picture.
+    pub texture: wgpu::TextureView,
+    /// NED position of the mesh's own origin, metres.
+    pub origin_ned_m: DVec3,
+}
+
+impl SceneBuffers {
+    /// Uploads a scene.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] for what the adapter cannot hold.
+    pub fn new(gpu: &GpuContext, scene: &Scene) -> Result<Self, GpuError> {
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("camsim.ideal.sampler"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            mipmap_filter: wgpu::MipmapFilterMode::Linear,
+            anisotropy_clamp: 16,
+            ..Default::default()
+        });
+        let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
+        let meshes = scene.meshes.iter().map(|mesh| upload_mesh(gpu, mesh)).collect::<Result<_, _>>()?;
+        Ok(Self { terrain, meshes, sampler })
+    }
+}
+
+fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
+    let floats: Vec<f32> = terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], v.uv[0], v.uv[1]]).collect();
+    gpu.check_storage("the terrain's vertices", 4 * floats.len() as u64, "use a smaller or coarser DEM in scene.terrain.dem")?;
+    let mut indices = Vec::new();
+    let levels = std::array::from_fn(|level| {
+        let first = indices.len() as u32;
+        push_level(&mut indices, 1 << level);
+        first..indices.len() as u32
+    });
+    let void_base = indices.len() as u32;
+    // Chunk-local vertex numbers to lattice numbers, so that one vertex shader serves both.
+    let mut lattice = vec![0; terrain.void_indices.len()];
+    for chunk in &terrain.chunks {
+        for i in chunk.void_indices.clone().unwrap_or_default() {
+            let (vertex, width) = (terrain.void_indices[i as usize], chunk.cells[0] + 1);
+            lattice[i as usize] = vertex / width * (CHUNK_CELLS + 1) + vertex % width;
+        }
+    }
+    indices.extend(lattice);
+    let buffer = |label, contents: &[u8], usage| {
+        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+    };
+    Ok(TerrainBuffers {
+        vertices: buffer("camsim.terrain.vertices", bytemuck::cast_slice(&floats), wgpu::BufferUsages::STORAGE),
+        indices: buffer("camsim.terrain.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+        levels,
+        void_base,
+        texture: upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?,
+    })
+}
+
+/// Two triangles a cell of stride `s` over the full 65x65 lattice, diagonal from north-west to south-east.
+fn push_level(indices: &mut Vec<u32>, s: u32) {
+    let row = CHUNK_CELLS + 1;
+    for j in (0..CHUNK_CELLS).step_by(s as usize) {
+        for i in (0..CHUNK_CELLS).step_by(s as usize) {
+            let nw = j * row + i;
+            let (ne, sw, se) = (nw + s, nw + s * row, nw + s * row + s);
+            indices.extend([nw, sw, se, nw, se, ne]);
+        }
+    }
+}
+
+fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {
+    let floats: Vec<f32> = mesh.vertices.iter().flat_map(|v| v.position_m.into_iter().chain(v.uv)).collect();
+    let buffer = |label, contents: &[u8], usage| {
+        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+    };
+    Ok(MeshBuffers {
+        vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&floats), wgpu::BufferUsages::VERTEX),
+        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
+        count: mesh.indices.len() as u32,
+        texture: upload_texture(gpu, &mesh.texture, "the picture of a mesh or pattern")?,
+        origin_ned_m: mesh.origin_ned_m,
+    })
+}
+
+fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgpu::TextureView, GpuError> {
+    let [width, height] = texture.size_px;
+    if width.max(height) > gpu.max_side_px() {
+        return Err(GpuError::TooLarge {
+            what: format!("{what} ({width}x{height} px)"),
+            needed: u64::from(width.max(height)),
+            limit_name: "max_texture_dimension_2d",
+            limit: u64::from(gpu.max_side_px()),
+            fix: "reduce the picture",
+        });
+    }
+    let mips = texture.mips();
+    let format = match texture.encoding {
+        Encoding::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
+        Encoding::Linear => wgpu::TextureFormat::Rgba8Unorm,
+    };
+    let mut data = texture.rgba8.clone();
+    mips.iter().for_each(|mip| data.extend_from_slice(&mip.rgba8));
+    let on_device = gpu.device.create_texture_with_data(
+        &gpu.queue,
+        &wgpu::TextureDescriptor {
+            label: Some("camsim.surface.texture"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: mips.len() as u32 + 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        },
+        wgpu::util::TextureDataOrder::LayerMajor,
+        &data,
+    );
+    Ok(on_device.create_view(&wgpu::TextureViewDescriptor::default()))
+}
