@@ -263,19 +263,29 @@ fn sertig_lies_where_it_should() {
     let down = terrain.down_at(0.0, 0.0).unwrap();
     assert!((-down - -centre.z).abs() < 30.0, "{down} {centre}");
 
-    let camera =
-        CameraPose { position_ned_m: DVec3::new(0.0, 0.0, -4500.0), ned_from_camera: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2) };
-    for (max_error_px, at_most) in [(0.25, 1_000_000), (1.0, 200_000)] {
-        let begin = std::time::Instant::now();
-        let selection = select_lod(terrain, &camera, [-1.1, 1.1, -0.9, 0.9], 307.6, max_error_px);
-        eprintln!(
-            "{max_error_px} px: {} chunks, {} triangles, {:.3} px, {:.0} us",
-            selection.draws.len(),
-            selection.triangles,
-            selection.max_error_px,
-            begin.elapsed().as_secs_f64() * 1e6
-        );
-        assert!(selection.max_error_px <= max_error_px && selection.triangles < at_most);
+    // Straight down and 30 degrees below the horizon, at the height of the demo flight.
+    let nadir = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    let oblique = nadir * DQuat::from_rotation_x(60f64.to_radians());
+    for (name, ned_from_camera) in [("nadir", nadir), ("oblique", oblique)] {
+        let camera = CameraPose { position_ned_m: DVec3::new(0.0, 0.0, -3500.0), ned_from_camera };
+        let mut before = u64::MAX;
+        for max_error_px in [0.25, 0.5, 1.0, 2.0, 4.0] {
+            let begin = std::time::Instant::now();
+            let selection = select_lod(terrain, &camera, [-1.0, 1.0, -0.75, 0.75], 307.6, max_error_px);
+            let microseconds = begin.elapsed().as_secs_f64() * 1e6;
+            let levels: Vec<_> = (0..7).map(|level| selection.draws.iter().filter(|draw| draw.level == level).count()).collect();
+            eprintln!(
+                "{name} {max_error_px} px: chunks by level {levels:?}, {} triangles, {:.3} px, {microseconds:.0} us",
+                selection.triangles, selection.max_error_px
+            );
+            assert!(selection.max_error_px <= max_error_px && selection.triangles <= before);
+            before = selection.triangles;
+        }
+    }
+    for level in 1..7 {
+        let mut errors: Vec<_> = terrain.chunks.iter().map(|chunk| chunk.error[level]).collect();
+        errors.sort_by(|a, b| a.total_m.total_cmp(&b.total_m));
+        eprintln!("level {level}: median error {:?}, largest {:?}", errors[errors.len() / 2], errors[errors.len() - 1]);
     }
 }
 
