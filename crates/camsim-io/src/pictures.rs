@@ -157,7 +157,7 @@ mod tests {
             let gray = read_gray_image(&data.join(name)).unwrap();
             assert_eq!(gray.size_px, [640, 480]);
             let (low, high) = gray.values.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
-            assert!(low >= 0.0 && low < 0.2 && high > 0.6 && high <= 1.0, "{name} {low} {high}");
+            assert!((0.0..0.2).contains(&low) && (0.6..=1.0).contains(&high), "{name} {low} {high}");
         }
         for (name, size) in [
             ("texture/DJI_0032.JPG", [4000, 2250]),

@@ -230,11 +230,11 @@ impl Dem {
             Some(code) => return Err(TerrainFileError::Unit { path: path.into(), what: "vertical", code }),
         };
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
-        let nodata = geo.nodata;
+        let mark = geo.nodata.unwrap_or(COMMON_NODATA);
         let mut heights_m = raster.first_band();
         heights_m.par_iter_mut().for_each(|height| {
             // A float32 file may declare its mark with more digits than it holds.
-            let is_nodata = nodata.map_or(*height == COMMON_NODATA, |mark| *height == mark || *height as f32 == mark as f32);
+            let is_nodata = *height == mark || *height as f32 == mark as f32;
             let metres = *height * metres_per_unit;
             *height = if is_nodata || !(lowest..=highest).contains(&metres) { f64::NAN } else { metres };
         });

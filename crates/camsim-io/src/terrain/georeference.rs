@@ -42,8 +42,8 @@ impl Affine {
         Self { origin: self.apply([columns, 0.0]), column: self.column.map(|x| -x), ..*self }
     }
 
-    /// From a transformation whose whole pixel coordinates are pixel centres.
-    pub fn from_centres(self) -> Self {
+    /// The same place for a transformation whose whole pixel coordinates are pixel centres.
+    pub fn with_centres_at_half(self) -> Self {
         Self { origin: self.apply([-0.5, -0.5]), ..self }
     }
 }
@@ -75,7 +75,7 @@ pub(super) fn world_file(path: &Path) -> Result<Option<Affine>, TerrainFileError
         .map(|(index, word)| word.parse::<f64>().map_err(|_| error(format!("number {} is `{word}`", index + 1))))
         .collect::<Result<Vec<_>, _>>()?;
     let [a, d, b, e, c, f] = values[..] else { return Err(error(format!("{} numbers found", values.len()))) };
-    Ok(Some(Affine { origin: [c, f], column: [a, d], row: [b, e] }.from_centres()))
+    Ok(Some(Affine { origin: [c, f], column: [a, d], row: [b, e] }.with_centres_at_half()))
 }
 
 #[cfg(test)]

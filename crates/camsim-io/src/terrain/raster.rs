@@ -211,7 +211,7 @@ impl GeoTags {
         let affine = affine(scale.as_deref(), tie.as_deref(), matrix.as_deref());
         Ok(Self {
             // 2: whole pixel coordinates are pixel centres ("pixel is point").
-            model_from_pixel: if raster_type == Some(2) { affine.map(Affine::from_centres) } else { affine },
+            model_from_pixel: if raster_type == Some(2) { affine.map(Affine::with_centres_at_half) } else { affine },
             // 3072: projected; 2048: geographic, which a projected file may state too, as its base.
             epsg: key(3072).or_else(|| key(2048)),
             nodata,

@@ -124,7 +124,7 @@ impl Terrain {
 /// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates its volume in floating point,
 /// so two triangles agree on which side of their common edge a ray passes. Where several edges meet, rounding could still open a gap:
 /// triangles are larger by the rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
-pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+pub(in crate::scene) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
     /// 18 products and sums at most, of eps / 2 each, and some reserve.
     const ROUNDING: f64 = 4e-15;
     let [a, b, c] = points.map(|p| p - origin);
