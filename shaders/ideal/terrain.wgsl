@@ -19,6 +19,9 @@ struct ChunkDraw {
 @group(1) @binding(3) var<storage, read> chunk_draws: array<ChunkDraw>;
 
 fn snap(i: u32, cells: u32, level: u32) -> u32 {
+    if (i >= cells) {
+        return cells;
+    }
     let stride = 1u << level;
     return min((i + stride / 2u) / stride * stride, cells);
 }

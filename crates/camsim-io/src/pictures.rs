@@ -1,1 +1,172 @@
-//! (being written)
+//! Pictures: textures and grey maps out of PNG, JPEG, GIF (first frame), BMP and TIFF files. The format is told by content, not by name.
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    scene::{Encoding, Texture},
+    sequence::GrayImage,
+};
+use image::{DynamicImage, ImageReader};
+
+use crate::terrain::raster::{Raster, is_tiff};
+
+/// Why a picture cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The file cannot be opened.
+    #[error("{path}: cannot be read: {source}")]
+    Open {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The content is not what it should be.
+    #[error("{path}: cannot be decoded: {reason}")]
+    Decode {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and, where known, what to do.
+        reason: String,
+    },
+}
+
+impl PictureError {
+    pub(crate) fn open(path: &Path, source: std::io::Error) -> Self {
+        Self::Open { path: path.into(), source }
+    }
+
+    pub(crate) fn decode(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Decode { path: path.into(), reason: reason.into() }
+    }
+}
+
+/// Reads a picture as a texture; `encoding` says what its colour values mean. 16-bit values are rounded to 8 bits.
+///
+/// # Errors
+///
+/// [`PictureError`] names the file.
+pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureError> {
+    if is_tiff(path)? {
+        return Raster::read(path)?.to_texture(path, encoding);
+    }
+    let picture = decode(path)?.into_rgba8();
+    Ok(Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding })
+}
+
+/// Reads a picture as stored grey values 0..=1 (a vignette map, say): no transfer curve is undone. Colours become Rec. 709 luma.
+///
+/// # Errors
+///
+/// [`PictureError`] names the file.
+pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
+    if is_tiff(path)? {
+        return Raster::read(path)?.to_gray(path);
+    }
+    let picture = decode(path)?;
+    let size_px = [picture.width(), picture.height()];
+    let values = match picture {
+        DynamicImage::ImageLuma8(gray) => gray.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),
+        DynamicImage::ImageLuma16(gray) => gray.into_raw().into_iter().map(|v| f32::from(v) / 65535.0).collect(),
+        other => {
+            let rgb = other.into_rgb16();
+            rgb.pixels().map(|pixel| luma(pixel.0.map(|v| f32::from(v) / 65535.0))).collect()
+        }
+    };
+    Ok(GrayImage { size_px, values })
+}
+
+pub(crate) fn gray_from_texture(texture: &Texture) -> GrayImage {
+    let values = texture.rgba8.chunks_exact(4).map(|p| luma([p[0], p[1], p[2]].map(|v| f32::from(v) / 255.0))).collect();
+    GrayImage { size_px: texture.size_px, values }
+}
+
+/// Equal channels give exactly their value.
+fn luma([r, g, b]: [f32; 3]) -> f32 {
+    if r == g && g == b { r } else { 0.2126 * r + 0.7152 * g + 0.0722 * b }
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
+    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| PictureError::open(path, source))?;
+    if reader.format().is_none() {
+        return Err(PictureError::decode(path, "not a PNG, JPEG, GIF, BMP or TIFF file"));
+    }
+    let picture = reader.decode().map_err(|error| PictureError::decode(path, error.to_string()))?;
+    if picture.width() == 0 || picture.height() == 0 {
+        return Err(PictureError::decode(path, "the picture has no pixel"));
+    }
+    Ok(picture)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn formats_are_told_by_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut picture = image::RgbaImage::from_pixel(3, 2, image::Rgba([10, 20, 30, 255]));
+        picture.put_pixel(2, 1, image::Rgba([200, 100, 50, 255]));
+        for format in [image::ImageFormat::Png, image::ImageFormat::Bmp, image::ImageFormat::Gif] {
+            let path = folder.path().join("picture.dat");
+            picture.save_with_format(&path, format).unwrap();
+            let texture = read_texture(&path, Encoding::Srgb).unwrap();
+            assert_eq!(texture.size_px, [3, 2]);
+            assert_eq!(&texture.rgba8[20..23], [200, 100, 50], "{format:?}");
+        }
+    }
+
+    #[test]
+    fn grey_values_keep_their_depth() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep.png");
+        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(2, 1, vec![1u16, 65535]).unwrap().save(&path).unwrap();
+        let gray = read_gray_image(&path).unwrap();
+        assert_eq!(gray.values, [1.0 / 65535.0, 1.0]);
+        let path = folder.path().join("colour.png");
+        image::RgbImage::from_raw(2, 1, vec![255, 255, 255, 255, 0, 0]).unwrap().save(&path).unwrap();
+        assert_eq!(read_gray_image(&path).unwrap().values, [1.0, 0.2126]);
+    }
+
+    #[test]
+    fn bad_files_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("missing.png");
+        assert!(read_texture(&missing, Encoding::Srgb).unwrap_err().to_string().contains("missing.png: cannot be read"));
+        for (name, bytes) in
+            [("empty.png", &b""[..]), ("text.png", b"hello, world"), ("cut.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), ("cut.tif", b"II*\0")]
+        {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let text = read_texture(&path, Encoding::Srgb).unwrap_err().to_string();
+            assert!(text.contains(name) && text.contains("cannot be"), "{text}");
+            assert!(read_gray_image(&path).is_err());
+        }
+    }
+
+    #[test]
+    fn real_pictures_read() {
+        let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
+            eprintln!("CAMSIM_DATA is not set: real pictures are not read");
+            return;
+        };
+        let pattern = data.join("camsim/acircles_pattern-patternsX-towards-imageTop(North).gif");
+        assert_eq!(read_texture(&pattern, Encoding::Srgb).unwrap().size_px, [1830, 1330]);
+        for name in ["camsim/vignet-S3LowOffset.bmp", "camsim/vignet-fisheye-640x480.bmp"] {
+            let gray = read_gray_image(&data.join(name)).unwrap();
+            assert_eq!(gray.size_px, [640, 480]);
+            let (low, high) = gray.values.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+            assert!((0.0..0.2).contains(&low) && (0.6..=1.0).contains(&high), "{name} {low} {high}");
+        }
+        for (name, size) in [
+            ("texture/DJI_0032.JPG", [4000, 2250]),
+            ("texture/neon_2019_YELL_2_541000_4977000_image_crop.png", [1249, 1035]),
+            ("terrain/brighton_beach/brighton_beach.jpg", [1865, 1085]),
+            ("terrain/sertig/sertig_valley_color.tif", [641, 917]),
+        ] {
+            let texture = read_texture(&data.join(name), Encoding::Srgb).unwrap();
+            assert_eq!((texture.size_px, texture.rgba8.len()), (size, 4 * (size[0] * size[1]) as usize), "{name}");
+        }
+    }
+}

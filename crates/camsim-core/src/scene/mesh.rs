@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Texture;
+use super::{Texture, terrain::intersect_triangle};
 
 /// What a texture shows outside of 0..=1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,8 +60,23 @@ impl Mesh {
         }
     }
 
+    /// First point along `origin + t direction`, 0 <= t <= `t_max`, from either side: t and the texture coordinates there. Looks at
+    /// every triangle.
+    pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<(f64, [f64; 2])> {
+        let mut best = None;
+        let mut limit = t_max;
+        for corners in self.indices.chunks_exact(3) {
+            let corners = [corners[0], corners[1], corners[2]];
+            if let Some((t, weights)) = intersect_triangle(corners.map(|v| self.position_ned_m(v)), origin_ned_m, direction_ned, limit) {
+                let uvs = corners.map(|v| self.vertices[v as usize].uv);
+                limit = t;
+                best = Some((t, [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum())));
+            }
+        }
+        best
+    }
+
     /// Lower bound of the distance from a point to the mesh, metres: that of its bounding box.
-    #[must_use]
     pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
         let mut low = DVec3::INFINITY;
         let mut high = DVec3::NEG_INFINITY;
@@ -92,6 +107,9 @@ mod tests {
         assert_eq!(mesh.position_ned_m(top_left as u32), DVec3::new(110.0, -70.0, 3.0));
         let bottom_right = mesh.vertices.iter().position(|v| v.uv == [1.0, 1.0]).expect("corner");
         assert_eq!(mesh.position_ned_m(bottom_right as u32), DVec3::new(90.0, -30.0, 3.0));
+        let (t, uv) = mesh.intersect(DVec3::new(105.0, -40.0, -7.0), DVec3::Z, 100.0).expect("hit");
+        assert!((t - 10.0).abs() < 1e-9 && (uv[0] - 0.75).abs() < 1e-9 && (uv[1] - 0.25).abs() < 1e-9, "{t} {uv:?}");
+        assert_eq!(mesh.intersect(DVec3::new(111.0, -40.0, -7.0), DVec3::Z, 100.0), None);
         // Both triangles turn the same way and cover the rectangle.
         let area: f64 = mesh
             .indices

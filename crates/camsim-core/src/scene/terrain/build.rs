@@ -61,7 +61,7 @@ impl Terrain {
     /// A terrain from NED positions (metres) of `cols` x `rows` grid points, row after row from the north, each from the west; points that
     /// are not finite are voids. `uvs` are texture coordinates of the same points.
     ///
-    /// Positions are rounded to [`Terrain::quantum_m`] (chunk size * 2^-24 or finer, a quarter of a millimetre for cells of 90 m).
+    /// Positions are rounded to [`Terrain::quantum_m`] (at most the chunk's size * 2^-23: half a millimetre for cells of 90 m).
     ///
     /// # Errors
     ///

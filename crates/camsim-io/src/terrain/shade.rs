@@ -1,0 +1,50 @@
+//! Colour for terrain without a picture: tinted by height, shaded from the north-west.
+
+use camsim_core::scene::{Encoding, Texture};
+use glam::DVec3;
+
+/// Height tints from the lowest to the highest point, sRGB.
+const TINTS: [[f64; 3]; 5] =
+    [[88.0, 125.0, 78.0], [140.0, 155.0, 95.0], [170.0, 150.0, 115.0], [150.0, 138.0, 128.0], [235.0, 235.0, 238.0]];
+
+/// Light that reaches faces turned away from the sun.
+const AMBIENT: f64 = 0.35;
+
+/// One pixel a height; voids are transparent.
+pub(super) fn relief(size: [u32; 2], heights_m: &[f64], points_ned_m: &[DVec3]) -> Texture {
+    let [cols, rows] = size.map(|n| n as usize);
+    let (low, high) =
+        heights_m.iter().filter(|h| !h.is_nan()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &h| (low.min(h), high.max(h)));
+    // Towards a sun in the north-west, 45 degrees up.
+    let to_sun = DVec3::new(0.5, -0.5, -std::f64::consts::FRAC_1_SQRT_2);
+    let mut rgba8 = vec![0; 4 * cols * rows];
+    for (index, pixel) in rgba8.chunks_exact_mut(4).enumerate() {
+        let height = heights_m[index];
+        if height.is_nan() {
+            continue;
+        }
+        let (i, j) = (index % cols, index / cols);
+        let point = |i: usize, j: usize| points_ned_m[j * cols + i];
+        let eastwards = point((i + 1).min(cols - 1), j) - point(i.saturating_sub(1), j);
+        let southwards = point(i, (j + 1).min(rows - 1)) - point(i, j.saturating_sub(1));
+        // Beside a void there is no slope: then as level ground.
+        let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
+        let upwards = if normal.z > 0.0 { -normal } else { normal };
+        let light = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
+        let share = if high > low { (height - low) / (high - low) } else { 0.0 };
+        for (byte, tint) in pixel.iter_mut().zip(tint(share)) {
+            *byte = (tint * light).clamp(0.0, 255.0) as u8;
+        }
+        pixel[3] = 255;
+    }
+    let mut texture = Texture { size_px: size, rgba8, encoding: Encoding::Srgb };
+    texture.bleed_into_transparent();
+    texture
+}
+
+fn tint(share: f64) -> [f64; 3] {
+    let position = share.clamp(0.0, 1.0) * (TINTS.len() - 1) as f64;
+    let below = (position as usize).min(TINTS.len() - 2);
+    let rest = position - below as f64;
+    [0, 1, 2].map(|k: usize| TINTS[below][k] + rest * (TINTS[below + 1][k] - TINTS[below][k]))
+}
