@@ -5,6 +5,7 @@ use camsim_core::camera::{CameraModel, INVALID_UV};
 use camsim_core::lens::{Lens, LensModel};
 use camsim_gpu::reverse::lens_inverse::LensInversePass;
 use glam::DVec2;
+use rayon::prelude::*;
 
 /// f32 floor of Newton's method at up to 8192 px: NUMERICS 1.
 const MAX_ERROR_PX: f64 = 1e-3;
@@ -123,37 +124,37 @@ fn compare(name: &str, camera: &CameraModel, map: &[[f32; 2]]) -> (f64, f64, f64
     let expected = camera.lens_inverse();
     assert_eq!(expected.len(), map.len());
     let border = border_px(camera);
-    let (mut worst, mut worst_near, mut invalid) = (0.0_f64, 0.0_f64, 0_usize);
-    for (i, (cpu, gpu)) in expected.iter().zip(map).enumerate() {
+    let judge = |(i, (cpu, gpu)): (usize, (&[f32; 2], &[f32; 2]))| {
         let pixel = DVec2::new((i % camera.size_px[0] as usize) as f64, (i / camera.size_px[0] as usize) as f64);
         let (cpu_valid, gpu_valid) = (cpu[0] < INVALID_UV, gpu[0] < INVALID_UV);
         assert_eq!(gpu[0] == INVALID_UV, gpu[1] == INVALID_UV, "{name} {pixel}: half a mark");
-        if !cpu_valid {
-            invalid += 1;
-        }
         if cpu_valid != gpu_valid {
             let distance = distance(&border, pixel);
             assert!(distance < BORDER_PX, "{name} {pixel}: CPU valid {cpu_valid}, GPU {gpu_valid}, {distance} px from the border");
-            continue;
         }
-        if !cpu_valid {
-            continue;
+        if !cpu_valid || !gpu_valid {
+            return (0.0, 0.0, usize::from(!cpu_valid));
         }
         let ideal = camera.unproject(pixel).unwrap();
         let error = error_px(camera, ideal, DVec2::new(f64::from(gpu[0]), f64::from(gpu[1])));
         if error <= MAX_ERROR_PX {
-            worst = worst.max(error);
-        } else {
-            // A lens that all but folds magnifies rounding as a fold does.
-            let jacobian = camera.lens.jacobian(ideal);
-            let smallest_stretch = jacobian.determinant() / jacobian.x_axis.length().max(jacobian.y_axis.length());
-            let distance = distance(&border, pixel);
-            assert!(distance < 1.0 || smallest_stretch < 0.05, "{name} {pixel}: off by {error} px, {distance} px from the border");
-            let limit = if distance < BORDER_PX { MAX_ERROR_AT_BORDER_PX } else { MAX_ERROR_NEAR_FOLD_PX };
-            assert!(error < limit, "{name} {pixel}: off by {error} px, {distance} px from the border");
-            worst_near = worst_near.max(error);
+            return (error, 0.0, 0);
         }
-    }
+        // A lens that all but folds magnifies rounding as a fold does.
+        let jacobian = camera.lens.jacobian(ideal);
+        let smallest_stretch = jacobian.determinant() / jacobian.x_axis.length().max(jacobian.y_axis.length());
+        let distance = distance(&border, pixel);
+        assert!(distance < 1.0 || smallest_stretch < 0.05, "{name} {pixel}: off by {error} px, {distance} px from the border");
+        let limit = if distance < BORDER_PX { MAX_ERROR_AT_BORDER_PX } else { MAX_ERROR_NEAR_FOLD_PX };
+        assert!(error < limit, "{name} {pixel}: off by {error} px, {distance} px from the border");
+        (0.0, error, 0)
+    };
+    let (worst, worst_near, invalid) = expected
+        .par_iter()
+        .zip(map)
+        .enumerate()
+        .map(judge)
+        .reduce(|| (0.0_f64, 0.0_f64, 0_usize), |a, b| (a.0.max(b.0), a.1.max(b.1), a.2 + b.2));
     (worst, worst_near, invalid as f64 / map.len() as f64)
 }
 

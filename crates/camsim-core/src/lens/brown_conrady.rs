@@ -8,6 +8,9 @@ use super::radial_table::RadialTable;
 /// Newton steps of the f64 inverse. Near a fold the root is nearly double and each step only halves the error: 60 reach the last bit.
 const MAX_STEPS: usize = 60;
 
+/// Steps without real progress after which there is nothing to be found.
+const MAX_STALLS: u32 = 5;
+
 /// A solution whose image misses the wanted point by more than this (units of the focal length, relative beyond 1) is none.
 const MAX_RESIDUAL: f64 = 1e-9;
 
@@ -74,6 +77,7 @@ impl BrownConrady {
         let start_limit = START_SHARE_OF_FOLD * fold_radius(start);
         let mut ideal = if start.length() > start_limit { start.normalize_or_zero() * start_limit } else { start };
         let mut error = formula.distort(ideal) - distorted;
+        let mut stalls = 0;
         for _ in 0..MAX_STEPS {
             let jacobian = formula.jacobian(ideal);
             // J is symmetric: J^-1 e = adj(J) e / det.
@@ -90,11 +94,15 @@ impl BrownConrady {
                 next = self.inside(ideal, ideal + step);
                 next_error = formula.distort(next) - distorted;
             }
-            let moved = (next - ideal).length();
-            if next_error.length_squared() <= error.length_squared() {
-                (ideal, error) = (next, next_error);
+            let (before, after) = (error.length_squared(), next_error.length_squared());
+            // Not even a tiny step helps: this is the nearest the branch comes, or the last bit.
+            if after >= before {
+                break;
             }
-            if moved <= 1e-15 * (1.0 + ideal.length()) {
+            (ideal, error) = (next, next_error);
+            // A root, double or not, is approached at least fourfold per step; what creeps slides along the fold.
+            stalls = if after > 0.9 * before { stalls + 1 } else { 0 };
+            if stalls == MAX_STALLS {
                 break;
             }
         }

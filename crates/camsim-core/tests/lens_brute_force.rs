@@ -1,0 +1,141 @@
+//! Fold and validity of every calibration set by a scan that shares nothing with the library's inverse: the formulas are written out
+//! again, derivatives are finite differences, and a pixel's pre-images are counted by the winding number of the border's image.
+#![allow(clippy::unwrap_used)]
+
+use std::f64::consts::{PI, TAU};
+
+use camsim_core::camera::CameraModel;
+use camsim_core::lens::LensModel;
+use glam::DVec2;
+use rayon::prelude::*;
+
+const RAYS: usize = 360;
+const STEPS: usize = 1500;
+/// A chord of the border's image is at most this far from the curve itself (360 rays, 1000 px): pixels nearer are not judged.
+const UNJUDGED_PX: f64 = 0.1;
+
+struct Set {
+    name: &'static str,
+    model: LensModel,
+    k: Vec<f64>,
+    camera: CameraModel,
+}
+
+fn sets() -> Vec<Set> {
+    let text: &'static str = include_str!("../../../tests/data/lens_sets.csv");
+    let set = |line: &'static str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |i: usize| cells[i].parse::<f64>().unwrap();
+        let model = if cells[1] == "brown-conrady" { LensModel::BrownConrady } else { LensModel::KannalaBrandt };
+        let mut k: Vec<f64> = cells[8].split_whitespace().map(|k| k.parse().unwrap()).collect();
+        let size_px = [number(2) as u32, number(3) as u32];
+        let camera = CameraModel::new(size_px, [number(4), number(5)], Some([number(6), number(7)]), model, &k).unwrap();
+        k.resize(8, 0.0);
+        Set { name: cells[0], model, k, camera }
+    };
+    text.lines().skip(1).map(set).collect()
+}
+
+impl Set {
+    fn forward(&self, p: DVec2) -> DVec2 {
+        let k = &self.k;
+        if self.model == LensModel::KannalaBrandt {
+            let r = p.x.hypot(p.y);
+            if r == 0.0 {
+                return p;
+            }
+            let t = r.atan2(1.0);
+            return p * ((t + k[0] * t.powi(3) + k[1] * t.powi(5) + k[2] * t.powi(7) + k[3] * t.powi(9)) / r);
+        }
+        let r = p.x.hypot(p.y);
+        let above = 1.0 + k[0] * r.powi(2) + k[1] * r.powi(4) + k[4] * r.powi(6);
+        let below = 1.0 + k[5] * r.powi(2) + k[6] * r.powi(4) + k[7] * r.powi(6);
+        let radial = above / below;
+        DVec2::new(
+            p.x * radial + 2.0 * k[2] * p.x * p.y + k[3] * (r * r + 2.0 * p.x * p.x),
+            p.y * radial + k[2] * (r * r + 2.0 * p.y * p.y) + 2.0 * k[3] * p.x * p.y,
+        )
+    }
+
+    fn determinant(&self, p: DVec2) -> f64 {
+        let h = 1e-6 * (1.0 + p.length());
+        let (e, n) = (DVec2::new(h, 0.0), DVec2::new(0.0, h));
+        let (a, b) = ((self.forward(p + e) - self.forward(p - e)) / (2.0 * h), (self.forward(p + n) - self.forward(p - n)) / (2.0 * h));
+        a.perp_dot(b)
+    }
+
+    /// First radius on a ray where the determinant is not positive, or where 89 degrees end.
+    fn fold_radius(&self, phi: f64) -> f64 {
+        let ray = DVec2::from_angle(phi);
+        let radius = |step: usize| (step as f64 / STEPS as f64 * 89.0 * PI / 180.0).tan();
+        let Some(first) = (1..=STEPS).find(|step| self.determinant(ray * radius(*step)) <= 0.0) else { return radius(STEPS) };
+        let (mut good, mut bad) = (radius(first - 1), radius(first));
+        for _ in 0..40 {
+            let middle = 0.5 * (good + bad);
+            *(if self.determinant(ray * middle) > 0.0 { &mut good } else { &mut bad }) = middle;
+        }
+        0.5 * (good + bad)
+    }
+}
+
+/// Turns of a closed polygon about a point, and its distance.
+fn winding(polygon: &[DVec2], point: DVec2) -> (i32, f64) {
+    let mut turned = 0.0;
+    let mut distance = f64::INFINITY;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = polygon[(i + 1) % polygon.len()];
+        let (to_a, along) = (*a - point, b - *a);
+        turned += to_a.angle_to(b - point);
+        let share = (-to_a.dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+        distance = distance.min((to_a + along * share).length());
+    }
+    ((turned / TAU).round() as i32, distance)
+}
+
+#[test]
+fn folds_and_valid_pixels_of_every_set() {
+    let judged: usize = sets().par_iter().map(judge).sum();
+    assert!(judged > 60_000, "only {judged} pixels were judged");
+}
+
+/// Judges about a thousand pixels of one camera.
+fn judge(set: &Set) -> usize {
+    let (name, camera) = (set.name, &set.camera);
+    let fold: Vec<f64> = (0..RAYS).map(|ray| set.fold_radius(ray as f64 * TAU / RAYS as f64)).collect();
+    for (ray, radius) in fold.iter().enumerate() {
+        let phi = ray as f64 * TAU / RAYS as f64;
+        let error = (camera.lens.fold_radius(phi) / radius - 1.0).abs();
+        // Finite differences of step 1e-6 next to a pole or a flat fold are worth 1e-4.
+        assert!(error < 1e-4, "{name}, ray {ray}: fold at {}, the scan says {radius}", camera.lens.fold_radius(phi));
+    }
+    // A thousandth inside: at a fold that moves the image by a millionth, and it keeps clear of what a pole does to rounding.
+    let border: Vec<DVec2> = fold
+        .iter()
+        .enumerate()
+        .map(|(ray, radius)| {
+            let image = set.forward(DVec2::from_angle(ray as f64 * TAU / RAYS as f64) * (radius * (1.0 - 1e-3)));
+            image * camera.focal_px + camera.principal_point_px
+        })
+        .collect();
+    let mut judged = 0;
+    for row in 0..32 {
+        for column in 0..32 {
+            let share = DVec2::new(f64::from(column), f64::from(row)) / 31.0;
+            let pixel = share * DVec2::new(f64::from(camera.size_px[0] - 1), f64::from(camera.size_px[1] - 1));
+            let answer = camera.unproject(pixel);
+            if let Some(ideal) = answer {
+                let image = set.forward(ideal) * camera.focal_px + camera.principal_point_px;
+                assert!((image - pixel).length() < 1e-4, "{name} {pixel}: {ideal} is imaged at {image}");
+                let ray = ideal.y.atan2(ideal.x).rem_euclid(TAU) / TAU * RAYS as f64;
+                let (here, next) = (fold[ray as usize % RAYS], fold[(ray as usize + 1) % RAYS]);
+                assert!(ideal.length() < 1.0001 * here.max(next), "{name} {pixel}: {ideal} lies beyond the fold");
+            }
+            let (turns, distance) = winding(&border, pixel);
+            if distance > UNJUDGED_PX {
+                assert_eq!(answer.is_some(), turns > 0, "{name} {pixel}: {turns} pre-images, {distance} px from the border: {answer:?}");
+                judged += 1;
+            }
+        }
+    }
+    judged
+}
