@@ -91,8 +91,10 @@ pub struct GpuContext {
     pub adapter: AdapterSummary,
 }
 
+/// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
 fn instance() -> wgpu::Instance {
-    wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env())
+    let from_env = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
+    wgpu::Instance::new(wgpu::InstanceDescriptor { backends: from_env.backends & wgpu::Backends::PRIMARY, ..from_env })
 }
 
 /// All adapters of this machine, the one that would be used first.

@@ -21,7 +21,7 @@ const NODES_PER_PERIOD: f64 = 8.0;
 /// Instants that cover a window: 17, and at least 8 a vibration period.
 pub(super) fn instants(path: &CameraPath, window_s: [f64; 2]) -> impl Iterator<Item = f64> {
     let [first, last] = window_s;
-    let steps = (NODES_PER_PERIOD * path.vibration_hz() * (last - first)).ceil().clamp(16.0, 4096.0) as u32;
+    let steps = (NODES_PER_PERIOD * path.highest_vibration_hz() * (last - first)).ceil().clamp(16.0, 4096.0) as u32;
     (0..=steps).map(move |k| first + (last - first) * f64::from(k) / f64::from(steps))
 }
 
@@ -115,7 +115,7 @@ pub(super) fn blur_stage(motion: &Motion, quality: &QualitySpec, path: &CameraPa
     }
     // The chord's miss falls with the square of the number of segments; half the tolerance goes to it.
     let by_curve = (motion.blur_sagitta_px / (0.5 * quality.max_error_px)).sqrt().ceil();
-    let by_vibration = (NODES_PER_PERIOD * path.vibration_hz() * shutter.exposure_s()).ceil();
+    let by_vibration = (NODES_PER_PERIOD * path.highest_vibration_hz() * shutter.exposure_s()).ceil();
     let segments = by_curve.max(if motion.blur_sagitta_px > NEGLIGIBLE * quality.max_error_px { by_vibration } else { 1.0 });
     let nodes = segments.clamp(1.0, f64::from(MAX_NODES - 1)) as u32 + 1;
     let (samples_per_px, max_samples) = match quality.blur_samples.value() {

@@ -1,0 +1,115 @@
+//! Synthetic sequences that need no files.
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use std::{convert::Infallible, sync::Arc};
+
+use camsim_core::{
+    mount::CameraPath,
+    pose::BodyState,
+    scenario::{Channel, Scenario},
+    scene::{Encoding, Mesh, Scene, Texture},
+    sequence::Sequence,
+    trajectory::Trajectory,
+};
+use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
+use glam::{DQuat, DVec3, EulerRot};
+
+/// The software adapter: figures compare between machines.
+pub fn engine() -> Engine {
+    Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them")
+}
+
+/// A default scenario to change; log and scene are given in memory.
+pub fn scenario() -> Scenario {
+    Scenario {
+        seed: 12,
+        flight: serde_free_flight(),
+        tracker: Default::default(),
+        camera: Default::default(),
+        scene: Default::default(),
+        quality: Default::default(),
+        output: Default::default(),
+    }
+}
+
+fn serde_free_flight() -> camsim_core::scenario::FlightSpec {
+    camsim_core::scenario::FlightSpec {
+        log: "in-memory".into(),
+        format: Default::default(),
+        angles: Default::default(),
+        attitude: Default::default(),
+        origin: Default::default(),
+        height: Default::default(),
+        window_s: None,
+        speed: 1.0,
+    }
+}
+
+/// Constant velocity and body rate about t = 0: at `height_m` over the origin, heading `yaw_deg`.
+pub fn steady(height_m: f64, yaw_deg: f64, velocity_ned_m_s: DVec3, rate_body_rad_s: DVec3) -> Trajectory {
+    let at_zero = BodyState {
+        position_ned_m: DVec3::new(0.0, 0.0, -height_m),
+        velocity_ned_m_s,
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: DQuat::from_euler(EulerRot::ZYX, yaw_deg.to_radians(), 0.0, 0.0),
+        rate_body_rad_s,
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let start_s = -5.0;
+    let turn = DQuat::from_scaled_axis(rate_body_rad_s * start_s);
+    let first = BodyState {
+        position_ned_m: at_zero.position_ned_m + velocity_ned_m_s * start_s,
+        ned_from_body: (at_zero.ned_from_body * turn).normalize(),
+        ..at_zero
+    };
+    Trajectory::uniform(start_s, 10.0, 5.0, vec![first]).expect("one segment")
+}
+
+/// A smooth picture on the ground: band-limited, so that interpolation errors stay small.
+pub fn pattern(width_m: f64) -> Scene {
+    const SIDE: u32 = 512;
+    let level = |x: u32, y: u32, k: f64, phase: f64| {
+        let s = (std::f64::consts::TAU * k * f64::from(x) / f64::from(SIDE) + phase).sin() * (std::f64::consts::TAU * k * f64::from(y) / f64::from(SIDE)).cos();
+        (127.5 + 110.0 * s).round() as u8
+    };
+    let rgba8 = (0..SIDE * SIDE).flat_map(|i| {
+        let (x, y) = (i % SIDE, i / SIDE);
+        [level(x, y, 8.0, 0.0), level(x, y, 5.0, 1.0), level(x, y, 11.0, 2.0), 255]
+    });
+    let texture = Texture { size_px: [SIDE, SIDE], rgba8: rgba8.collect(), encoding: Encoding::Linear };
+    Scene {
+        meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)],
+        sky_linear: [0.2, 0.4, 0.8],
+        ..Scene::default()
+    }
+}
+
+/// A sequence whose frame 0 has its stamp at t = 0.
+pub fn sequence(scenario: Scenario, trajectory: Trajectory, scene: Scene) -> Arc<Sequence> {
+    let path = CameraPath::new(trajectory, &scenario.camera.mount).expect("a legal mount");
+    Arc::new(Sequence {
+        scenario,
+        path: Arc::new(path),
+        epoch_ns: 0,
+        start_s: 0.0,
+        frames: 100,
+        scene: Arc::new(scene),
+        vignette: None,
+        zoom_track: Vec::new(),
+    })
+}
+
+/// Renders one frame with the given coordinates phase.
+pub fn render_at_phase(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64, phase: f32) -> Finished {
+    let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
+    session.set_coords_phase(phase);
+    let mut found = None;
+    session.render::<Infallible>([frame], &mut |finished| Ok(found = Some(finished))).expect("render");
+    found.expect("one frame")
+}
+
+/// Renders one frame.
+pub fn render(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Finished {
+    render_at_phase(engine, sequence, channels, frame, 0.0)
+}
