@@ -146,7 +146,7 @@ pub enum TrackerError {
 const MOST_TICKS: usize = 20_000_000;
 
 /// Standard deviation of the zero-lag smoothing of the reference that `sqrt` follows, seconds.
-const REFERENCE_SIGMA_S: f64 = 0.08;
+const REFERENCE_SIGMA_S: f64 = 0.09;
 /// Standard deviation of the smooth base that `spline` corrects, seconds.
 const SPLINE_BASE_SIGMA_S: f64 = 0.1;
 

@@ -79,7 +79,11 @@ fn assert_joined(trajectory: &Trajectory) {
 #[test]
 fn real_flight_is_followed_closer_than_the_reference_program_does() {
     let Some(rows) = lawnmower() else { return };
-    for (kind, rates) in [(TrackerKind::Sqrt, &[200.0, 400.0, 800.0][..]), (TrackerKind::Spline, &[200.0, 400.0][..])] {
+    // Largest RMS per channel; the reference program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052 deg. Most of the yaw error is one more
+    // corrupted row, 44848 (10 deg off for 24 ms).
+    let sqrt = [0.115, 0.07, 0.004, 0.045, 0.039, 0.047];
+    let spline = [0.105, 0.062, 0.003, 0.026, 0.019, 0.045];
+    for (kind, most, rates) in [(TrackerKind::Sqrt, sqrt, &[200.0, 400.0, 800.0][..]), (TrackerKind::Spline, spline, &[200.0, 400.0][..])] {
         for &rate_hz in rates {
             let tracked = track(&rows, &spec(kind, rate_hz)).unwrap();
             assert_limits_kept(&tracked);
@@ -87,12 +91,12 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
             let report = tracked.report(&rows).unwrap();
             let rms = report.rms;
             let name = format!("{kind:?} at {rate_hz} Hz: {rms:?}");
-            // The reference program reaches 0.373, 0.306, 0.076 m and 0.207, 0.042, 0.052 deg.
-            assert!(rms.north_m < 0.13 && rms.east_m < 0.08 && rms.down_m < 0.005, "{name}");
-            assert!(rms.roll_deg < 0.06 && rms.pitch_deg < 0.04 && rms.yaw_deg < 0.05, "{name}");
+            let channels = [rms.north_m, rms.east_m, rms.down_m, rms.roll_deg, rms.pitch_deg, rms.yaw_deg];
+            assert!(channels.into_iter().zip(most).all(|(own, most)| own < most), "{name}");
             for share in report.sign_changes_ned.into_iter().chain(report.sign_changes_body) {
-                // At most 3 % of ticks at 400 Hz: the log's own noise has the same number of turns a second at any rate.
-                assert!(share <= 0.03 * (400.0 / rate_hz).max(1.0), "{name}: {share}");
+                // No chatter, which would be 100 %: what is left are the turns of the log's own noise, up to 7 a second of which `spline` keeps.
+                let most = if kind == TrackerKind::Sqrt { 0.03 } else { 0.03f64.max(7.5 / rate_hz) };
+                assert!(share <= most, "{name}: {share}");
             }
             assert!(report.max_used.acceleration_m_s2 <= 19.6 && report.max_used.angular_acceleration_deg_s2 <= 60.0);
             assert!(report.samples == tracked.trajectory.segments() || report.samples + 1 == tracked.trajectory.segments());
@@ -283,29 +287,5 @@ fn faults_are_named() {
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let wrong = TrackerSpec { rate_hz: value, ..TrackerSpec::default() };
         assert!(matches!(track(&[good], &wrong).unwrap_err(), TrackerError::BadKey { key: "rate_hz", .. }));
-    }
-}
-
-#[test]
-fn explore() {
-    let Some(rows) = lawnmower() else { return };
-    for kind in [TrackerKind::Sqrt, TrackerKind::Spline, TrackerKind::Linear] {
-        for rate_hz in [400.0] {
-            let begin = std::time::Instant::now();
-            let tracked = track(&rows, &spec(kind, rate_hz)).unwrap();
-            let took = begin.elapsed();
-            let report = tracked.report(&rows).unwrap();
-            eprintln!(
-                "{kind:?} {rate_hz} {took:?} report {:?}\n rms {:.4?}\n max {:.3?}\n used {:.4?}\n signs {:.4?} {:.4?} sat {:.3?} {:?}",
-                begin.elapsed(),
-                report.rms,
-                report.max_error,
-                report.max_used,
-                report.sign_changes_ned,
-                report.sign_changes_body,
-                tracked.saturation,
-                tracked.limits
-            );
-        }
     }
 }
