@@ -25,8 +25,8 @@ mod reference;
 mod report;
 mod spline;
 
-pub use report::{Channels, MotionUse, TrackReport};
 use reference::{Interpolated, Reference};
+pub use report::{Channels, MotionUse, TrackReport};
 
 /// Limits of the platform, all positive and finite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -105,13 +105,17 @@ pub enum TrackerError {
     #[error("the flight log has no usable row; the tracker needs at least one")]
     Empty,
     /// NaN or infinity in a row, or a quaternion that is not of unit length.
-    #[error("row {row} of the flight log (counted from 1, after repairs) has a number that is not finite or an attitude that is no rotation; remove the row")]
+    #[error(
+        "row {row} of the flight log (counted from 1, after repairs) has a number that is not finite or an attitude that is no rotation; remove the row"
+    )]
     BadRow {
         /// Counted from 1.
         row: usize,
     },
     /// Time does not increase.
-    #[error("row {row} of the flight log (counted from 1, after repairs) is not later than the row before it; sort the log and merge rows of equal time")]
+    #[error(
+        "row {row} of the flight log (counted from 1, after repairs) is not later than the row before it; sort the log and merge rows of equal time"
+    )]
     TimeOrder {
         /// Counted from 1.
         row: usize,
@@ -125,7 +129,9 @@ pub enum TrackerError {
         value: f64,
     },
     /// The log is too long for the control rate.
-    #[error("{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate or shorten flight.window_s")]
+    #[error(
+        "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate or shorten flight.window_s"
+    )]
     TooLong {
         /// Length of the log.
         span_s: f64,
@@ -140,7 +146,7 @@ pub enum TrackerError {
 const MOST_TICKS: usize = 20_000_000;
 
 /// Standard deviation of the zero-lag smoothing of the reference that `sqrt` follows, seconds.
-const REFERENCE_SIGMA_S: f64 = 0.1;
+const REFERENCE_SIGMA_S: f64 = 0.09;
 /// Standard deviation of the smooth base that `spline` corrects, seconds.
 const SPLINE_BASE_SIGMA_S: f64 = 0.1;
 

@@ -200,7 +200,8 @@ mod tests {
         }
         let end = advance(&start, tau_s);
         assert!((end.position_ned_m - x).length() < 1e-12);
-        assert!((end.velocity_ned_m_s - v).length() < 1e-12);
+        // Two thousand roundings of 12 m/s, mostly of one sign.
+        assert!((end.velocity_ned_m_s - v).length() < 5e-12);
         assert!(so3::log(end.ned_from_body.inverse() * q).length() < 1e-12);
     }
 

@@ -136,8 +136,12 @@ impl SaturationClock {
     }
 
     fn tick(&mut self, limited: [bool; 4]) {
-        let longest =
-            [&mut self.longest.speed_s, &mut self.longest.acceleration_s, &mut self.longest.angular_rate_s, &mut self.longest.angular_acceleration_s];
+        let longest = [
+            &mut self.longest.speed_s,
+            &mut self.longest.acceleration_s,
+            &mut self.longest.angular_rate_s,
+            &mut self.longest.angular_acceleration_s,
+        ];
         for ((running_s, limited), longest_s) in self.running_s.iter_mut().zip(limited).zip(longest) {
             *running_s = if limited { *running_s + self.step_s } else { 0.0 };
             *longest_s = longest_s.max(*running_s);

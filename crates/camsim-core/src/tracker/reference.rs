@@ -168,7 +168,9 @@ mod tests {
     fn looks_up_forward_backward_and_outside() {
         let rows: Vec<_> = (0..50).map(|i| row(f64::from(i), f64::from(i * i), 0.1 * f64::from(i))).collect();
         let mut log = Interpolated::new(&rows).unwrap();
-        for (t_s, north_m) in [(0.5, 0.5), (1.5, 2.5), (48.5, 2352.5), (3.0, 9.0), (2.999, 8.995), (-9.0, 0.0), (99.0, 2401.0), (49.0, 2401.0)] {
+        for (t_s, north_m) in
+            [(0.5, 0.5), (1.5, 2.5), (48.5, 2352.5), (3.0, 9.0), (2.999, 8.995), (-9.0, 0.0), (99.0, 2401.0), (49.0, 2401.0)]
+        {
             let (position, attitude) = log.at(t_s);
             assert!((position.x - north_m).abs() < 1e-9, "{t_s}");
             let yaw = 0.1 * t_s.clamp(0.0, 49.0);
