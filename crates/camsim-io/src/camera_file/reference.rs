@@ -63,8 +63,11 @@ pub(super) fn import(document: &Document) -> Result<ImportedCamera, Problem> {
     Ok(imported)
 }
 
-/// Size, focal lengths and principal point after `resolutionScale`.
-fn intrinsics(value: &Value) -> Result<([u32; 2], [f64; 2], [f64; 2]), Problem> {
+/// Size, focal lengths, principal point.
+type Intrinsics = ([u32; 2], [f64; 2], [f64; 2]);
+
+/// After `resolutionScale`.
+fn intrinsics(value: &Value) -> Result<Intrinsics, Problem> {
     let key = |name: &str| format!("idealParams.{name}");
     let get = |name: &str| optional_number(value, &key(name));
     let (width, height) = (number(value, &key("width"))?, number(value, &key("height"))?);
