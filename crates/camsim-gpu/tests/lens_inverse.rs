@@ -127,7 +127,7 @@ fn compare(name: &str, camera: &CameraModel, map: &[[f32; 2]]) -> (f64, f64, f64
     let judge = |(i, (cpu, gpu)): (usize, (&[f32; 2], &[f32; 2]))| {
         let pixel = DVec2::new((i % camera.size_px[0] as usize) as f64, (i / camera.size_px[0] as usize) as f64);
         let (cpu_valid, gpu_valid) = (cpu[0] < INVALID_UV, gpu[0] < INVALID_UV);
-        assert_eq!(gpu[0] == INVALID_UV, gpu[1] == INVALID_UV, "{name} {pixel}: half a mark");
+        assert_eq!(gpu[0] < INVALID_UV, gpu[1] < INVALID_UV, "{name} {pixel}: half a mark");
         if cpu_valid != gpu_valid {
             let distance = distance(&border, pixel);
             assert!(distance < BORDER_PX, "{name} {pixel}: CPU valid {cpu_valid}, GPU {gpu_valid}, {distance} px from the border");
@@ -201,4 +201,33 @@ fn a_pinhole_and_odd_sizes() {
         let (worst, ..) = compare("pinhole", &camera, &gpu.map(&camera, None).0);
         assert!(worst < 1e-4);
     }
+}
+
+/// Lenses that nobody calibrated: every third one rational, a quarter of their pixels beyond the fold.
+#[test]
+fn random_lenses_agree_too() {
+    let gpu = Gpu::new();
+    // Park-Miller: the same lenses on every machine.
+    let mut state = 20_u64;
+    let mut random = |low: f64, high: f64| {
+        state = state * 48_271 % 2_147_483_647;
+        low + (high - low) * state as f64 / 2_147_483_647.0
+    };
+    let (mut judged, mut invalid) = (0, 0.0);
+    for i in 0..120 {
+        let mut k: Vec<f64> = [0.6, 0.4, 0.02, 0.02, 0.2].into_iter().map(|bound| random(-bound, bound)).collect();
+        if i % 3 == 0 {
+            k.extend([0.4, 0.2, 0.05].into_iter().map(|bound| random(-bound, bound)));
+        }
+        let focal = random(70.0, 200.0);
+        let centre = [random(60.0, 100.0), random(40.0, 80.0)];
+        let camera = CameraModel::new([160, 120], [focal; 2], Some(centre), LensModel::BrownConrady, &k).unwrap();
+        // Where a pixel has two ideal rays on the principal branch, either is an answer.
+        if camera.check().bijective {
+            invalid += compare(&format!("{k:?} f {focal}"), &camera, &gpu.map(&camera, None).0).2;
+            judged += 1;
+        }
+    }
+    eprintln!("{judged} lenses, {:.1} % of their pixels invalid", 100.0 * invalid / f64::from(judged));
+    assert!(judged > 80);
 }
