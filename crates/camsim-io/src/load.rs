@@ -1,1 +1,232 @@
-//! (being written)
+//! A scenario's files, read, checked against each other, and brought to one local frame: what rendering starts from.
+
+use std::{path::PathBuf, sync::Arc};
+
+use camsim_core::{
+    flight_log::{FlightLog, HeightConversion},
+    geodesy::{Geodetic, geoid_undulation_m},
+    mount::{CameraPath, MountError},
+    scenario::{HeightReference, PatternCentre, Scenario},
+    scene::{Encoding, Mesh, Scene, linear_from_srgb},
+    sequence::Sequence,
+    tracker::{Tracked, TrackerError, track},
+};
+use glam::DVec3;
+
+use crate::{
+    flight_log::{FlightLogError, read_flight_log},
+    pictures::{PictureError, read_gray_image, read_texture},
+    terrain::{TerrainFileError, TerrainSummary, read_terrain},
+};
+
+/// Why a scenario cannot be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// The flight log.
+    #[error(transparent)]
+    Log(#[from] FlightLogError),
+    /// The tracker.
+    #[error(transparent)]
+    Tracker(#[from] TrackerError),
+    /// The mount.
+    #[error(transparent)]
+    Mount(#[from] MountError),
+    /// The terrain.
+    #[error(transparent)]
+    Terrain(#[from] TerrainFileError),
+    /// A picture.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A local log over a georeferenced terrain.
+    #[error(
+        "{log} has local coordinates, but scene.terrain is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
+    )]
+    NoOrigin {
+        /// The log.
+        log: PathBuf,
+    },
+    /// No frame falls into the window.
+    #[error(
+        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher"
+    )]
+    NoFrame(f64, f64, f64),
+    /// The zoom track.
+    #[error("{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` and rows of finite numbers by ascending time")]
+    ZoomTrack {
+        /// The file.
+        path: PathBuf,
+        /// `, line N`, or nothing.
+        line: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A zoom lens without a track or the other way round.
+    #[error("camera.zoom and camera.zoom_track belong together: give both, or neither for a fixed lens")]
+    ZoomPair,
+}
+
+/// A loaded scenario and what there is to say about it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// What rendering needs.
+    pub sequence: Arc<Sequence>,
+    /// The cleaned log; its report counts every repair.
+    pub log: FlightLog,
+    /// The tracked trajectory with its limits.
+    pub tracked: Tracked,
+    /// Where the terrain lies.
+    pub terrain: Option<TerrainSummary>,
+    /// What a user should know but need not stop for.
+    pub warnings: Vec<String>,
+}
+
+/// Reads everything that a scenario names (paths as they stand).
+///
+/// # Errors
+/// [`LoadError`] names the file or key and what to do.
+pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
+    let (log_height, terrain_shift) = height_plan(scenario);
+    let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
+    let tracked = track(&log.rows, &scenario.tracker)?;
+    let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount)?;
+    let (scene, terrain) = load_scene(scenario, &log, terrain_shift)?;
+    let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose()?.map(Arc::new);
+    let zoom_track = load_zoom_track(scenario, &log)?;
+    let (start_s, frames) = frames_of_window(scenario, &log)?;
+    let sequence = Sequence {
+        scenario: scenario.clone(),
+        path: Arc::new(path),
+        epoch_ns: log.epoch_ns,
+        start_s,
+        frames,
+        scene: Arc::new(scene),
+        vignette,
+        zoom_track,
+    };
+    let warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
+    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings })
+}
+
+/// Equal vertical datums need no conversion; else whichever is above mean sea level goes through the geoid.
+fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
+    let log = scenario.flight.height;
+    let terrain = scenario.scene.terrain.as_ref().map_or(log, |terrain| terrain.height);
+    match (log, terrain) {
+        (HeightReference::Msl, HeightReference::Ellipsoid) => (HeightConversion::MslToEllipsoid, false),
+        (HeightReference::Ellipsoid, HeightReference::Msl) => (HeightConversion::None, true),
+        _ => (HeightConversion::None, false),
+    }
+}
+
+fn load_scene(scenario: &Scenario, log: &FlightLog, shift_terrain: bool) -> Result<(Scene, Option<TerrainSummary>), LoadError> {
+    let spec = &scenario.scene;
+    let mut scene = Scene {
+        sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
+        fog_visibility_m: spec.fog_visibility_m,
+        ..Scene::default()
+    };
+    let mut summary = None;
+    if let Some(terrain) = &spec.terrain {
+        let frame = log.frame.as_ref().ok_or_else(|| LoadError::NoOrigin { log: scenario.flight.log.clone() })?;
+        let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
+        let undulation = |lat_rad, lon_rad| geoid_undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 });
+        let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
+        scene.terrain = Some(loaded.terrain);
+        summary = Some(loaded.summary);
+    }
+    if let Some(pattern) = &spec.pattern {
+        let texture = read_texture(&pattern.image, Encoding::Srgb)?;
+        let centre = match pattern.at {
+            PatternCentre::Origin => DVec3::ZERO,
+            PatternCentre::Ned(ned) => DVec3::from_array(ned),
+        };
+        scene.meshes.push(Mesh::level_picture(Arc::new(texture), centre, pattern.width_m));
+    }
+    Ok((scene, summary))
+}
+
+/// Start (path time) and number of frames: frame i counts while its stamp is inside the half-open window.
+fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), LoadError> {
+    let speed = scenario.flight.speed;
+    let last_s = log.rows.last().map_or(0.0, |row| row.t_s);
+    let [start_s, end_s] = scenario.flight.window_s.map_or([0.0, last_s], |window| window.map(|t| t / speed));
+    let camera = &scenario.camera;
+    // A log of one row is a still camera: one frame unless a window says more.
+    let still = scenario.flight.window_s.is_none() && log.rows.len() == 1;
+    let count = ((end_s - start_s) * camera.fps - camera.phase - 1e-9).ceil().max(if still { 1.0 } else { 0.0 });
+    if count < 1.0 {
+        return Err(LoadError::NoFrame(start_s * speed, end_s * speed, camera.fps));
+    }
+    Ok((start_s, count as u64))
+}
+
+/// `t_s,zoom` on the log's clock, brought to path time.
+fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64)>, LoadError> {
+    let camera = &scenario.camera;
+    let Some(path) = &camera.zoom_track else {
+        return if camera.zoom.is_empty() { Ok(Vec::new()) } else { Err(LoadError::ZoomPair) };
+    };
+    if camera.zoom.is_empty() {
+        return Err(LoadError::ZoomPair);
+    }
+    let fail = |line: Option<u64>, problem: String| LoadError::ZoomTrack {
+        path: path.clone(),
+        line: line.map_or(String::new(), |line| format!(", line {line}")),
+        problem,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(|error| fail(None, error.to_string()))?;
+    if reader.headers().map_err(|error| fail(None, error.to_string()))? != ["t_s", "zoom"].as_slice() {
+        return Err(fail(Some(1), "the header is not `t_s,zoom`".into()));
+    }
+    let epoch_s = log.epoch_ns as f64 * 1e-9;
+    let mut rows: Vec<(f64, f64)> = Vec::new();
+    for record in reader.deserialize::<(f64, f64)>() {
+        let (t_s, zoom) = record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
+        let at = ((t_s - epoch_s) / scenario.flight.speed, zoom);
+        if !at.0.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= at.0) {
+            return Err(fail(None, format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before")));
+        }
+        rows.push(at);
+    }
+    if rows.is_empty() { Err(fail(None, "there are no rows".into())) } else { Ok(rows) }
+}
+
+fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
+    let mut warnings = tracked.warnings();
+    if !log.report.is_clean() {
+        warnings.push(format!("{}: {}", sequence.scenario.flight.log.display(), log.report));
+    }
+    let (first_s, last_s) = sequence.path.span_s();
+    let fps = sequence.scenario.camera.fps;
+    let end_s = sequence.start_s + (sequence.frames - 1) as f64 / fps;
+    let outside = (0..sequence.frames).filter(|&i| {
+        let t = sequence.start_s + i as f64 / fps;
+        t < first_s || t > last_s
+    });
+    if sequence.start_s < first_s || end_s > last_s {
+        warnings.push(format!("{} frames lie outside of the log and fly on at constant velocity", outside.count()));
+    }
+    if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
+        let step = (sequence.frames / 200).max(1);
+        let places = (0..sequence.frames).step_by(step as usize).map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
+        let (mut over, mut below, mut all) = (0, 0, 0);
+        for place in places {
+            all += 1;
+            if let Some(ground_down_m) = terrain.down_at(place.x, place.y) {
+                over += 1;
+                below += u32::from(place.z > ground_down_m);
+            }
+        }
+        let [lat, lon] = summary.centre_rad.map(f64::to_degrees);
+        if over == 0 {
+            warnings.push(format!("the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} deg"));
+        } else if below > 0 {
+            warnings.push(format!("the camera is below the ground in {below} of {all} places looked at: check flight.height and scene.terrain.height"));
+        }
+    }
+    warnings
+}
