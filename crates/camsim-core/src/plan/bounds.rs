@@ -119,11 +119,13 @@ pub(super) fn ideal_geometry(reach: &LensReach, path: &CameraPath, shutter: &Shu
             }
         }
     }
-    let low_px = (low * focal_px).floor() - RIM_PX;
-    let high_px = (high * focal_px).ceil() + RIM_PX;
-    let size = high_px - low_px + 1.0;
+    // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels fall together.
+    let principal_px = reach.camera.principal_point_px;
+    let first_px = (low * focal_px + principal_px).floor() - RIM_PX;
+    let last_px = (high * focal_px + principal_px).ceil() + RIM_PX;
+    let size = last_px - first_px + 1.0;
     let side = |length: f64| if length.is_finite() { length.clamp(2.0, f64::from(u32::MAX / 2)) as u32 } else { u32::MAX / 2 };
-    IdealGeometry { size_px: [side(size.x), side(size.y)], focal_px, principal_px: -low_px }
+    IdealGeometry { size_px: [side(size.x), side(size.y)], focal_px, principal_px: principal_px - first_px }
 }
 
 /// View of the camera were it still, with a tenth to spare.
