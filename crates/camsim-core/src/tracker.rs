@@ -128,6 +128,9 @@ pub enum TrackerError {
         /// Its value.
         value: f64,
     },
+    /// Two rows are so close in time that the velocity between them is beyond f64.
+    #[error("rows of the flight log are so close in time that the velocity between them is not finite; merge rows of nearly equal time")]
+    Overflow,
     /// The log is too long for the control rate.
     #[error(
         "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate or shorten flight.window_s"
@@ -165,8 +168,7 @@ pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerErro
             (Trajectory::uniform(start_s, reference.step_s, end_s, states), saturation)
         }
     };
-    // Finite rows and positive limits give finite states, unless numbers near the end of the f64 range overflow on the way.
-    let trajectory = trajectory.ok_or(TrackerError::BadRow { row: 1 })?;
+    let trajectory = trajectory.ok_or(TrackerError::Overflow)?;
     Ok(Tracked { trajectory, limits, saturation, rate_hz: spec.rate_hz })
 }
 

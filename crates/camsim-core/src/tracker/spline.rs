@@ -158,3 +158,57 @@ impl BandedFit {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wave(k: usize) -> DVec3 {
+        let t = k as f64;
+        DVec3::new((0.7 * t).sin(), (0.31 * t).cos() + 0.1 * t, if k > 20 { 5.0 } else { 0.0 })
+    }
+
+    #[test]
+    fn banded_solution_is_the_minimum() {
+        let count = 40;
+        let residual: Vec<DVec3> = (0..count).map(wave).collect();
+        let second: Vec<DVec3> = (0..count).map(|k| 0.1 * wave(3 * k)).collect();
+        let weights: Vec<f64> = (0..count).map(|k| 1.0 + 50.0 * (k % 7) as f64).collect();
+        let mut fit = BandedFit::new(count);
+        fit.solve(&residual, &second, &weights);
+        let cost = |d: &[DVec3]| {
+            let inner: f64 = (1..count - 1)
+                .map(|k| {
+                    let value = (d[k - 1] + 6.0 * d[k] + d[k + 1]) / 8.0 + 0.125 * second[k] - residual[k];
+                    let bend = d[k - 1] - 2.0 * d[k] + d[k + 1] + second[k];
+                    value.length_squared() + weights[k] * bend.length_squared()
+                })
+                .sum();
+            inner + (d[0] - residual[0]).length_squared() + (d[count - 1] - residual[count - 1]).length_squared()
+        };
+        let least = cost(&fit.solution);
+        for k in 0..count {
+            for axis in DVec3::AXES {
+                let slope = [1e-3, -1e-3].map(|step| {
+                    let mut moved = fit.solution.clone();
+                    moved[k] += axis * step;
+                    cost(&moved) - least
+                });
+                // A quadratic rises alike on both sides of its minimum; rounding of a cost of order 100.
+                assert!(slope[0] > 0.0 && (slope[0] - slope[1]).abs() < 1e-10, "{k}: {slope:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn corrections_keep_the_acceleration_limit() {
+        // A step of 5 m in a 400 Hz log, limit 19.6 m/s^2.
+        let (step_s, limit) = (1.0 / 400.0, 19.6 / 160_000.0);
+        let residual: Vec<DVec3> = (0..2000).map(|k| if k < 1000 { DVec3::ZERO } else { DVec3::Y * 5.0 }).collect();
+        let second = vec![DVec3::ZERO; residual.len()];
+        let d = corrections(&residual, &second, limit, step_s);
+        let used = second_differences(&d, |from, to| *to - *from).iter().map(|a| a.length()).fold(0.0, f64::max);
+        assert!(used <= limit, "{}", used / limit);
+        assert!(d[100].length() < 0.01 && (d[1900] - DVec3::Y * 5.0).length() < 0.01);
+    }
+}

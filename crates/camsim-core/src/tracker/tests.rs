@@ -282,6 +282,11 @@ fn faults_are_named() {
         assert_eq!(track(&[good, bad], &default).unwrap_err(), TrackerError::BadRow { row: 2 });
     }
     assert_eq!(track(&[good, good], &default).unwrap_err(), TrackerError::TimeOrder { row: 2 });
+    let denormal = row(5e-324, DVec3::X, DQuat::IDENTITY);
+    let linear = spec(TrackerKind::Linear, 400.0);
+    assert_eq!(track(&[good, denormal], &linear).unwrap_err(), TrackerError::Overflow);
+    let smooth = track(&[good, denormal], &TrackerSpec { max_speed_m_s: Auto::Value(5.0), ..TrackerSpec::default() }).unwrap();
+    assert!(smooth.trajectory.state(0.5).position_ned_m.is_finite());
     let late = row(1e9, DVec3::ZERO, DQuat::IDENTITY);
     assert!(matches!(track(&[good, late], &default).unwrap_err(), TrackerError::TooLong { .. }));
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
