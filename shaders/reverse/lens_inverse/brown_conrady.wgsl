@@ -46,8 +46,12 @@ fn scaled_to(ideal: vec2f, radius: f32) -> vec2f {
 
 // `to`, or if that is not inside the fold, the point in its direction mid-way between the radius of `origin` and the fold.
 fn inside(origin: vec2f, to: vec2f) -> vec2f {
+    let radius = length(to);
+    if radius < lens.fold_min {
+        return to;
+    }
     let fold = fold_radius(to);
-    if length(to) < fold {
+    if radius < fold {
         return to;
     }
     return scaled_to(to, 0.5 * (min(length(origin), fold) + fold));
@@ -64,8 +68,10 @@ fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
     if !(length(distorted) <= lens.distorted_max) {
         return nothing;
     }
-    let start_max = START_SHARE_OF_FOLD * fold_radius(start);
-    var ideal = select(start, scaled_to(start, start_max), length(start) > start_max);
+    var ideal = start;
+    if length(start) > START_SHARE_OF_FOLD * lens.fold_min {
+        ideal = scaled_to(start, min(length(start), START_SHARE_OF_FOLD * fold_radius(start)));
+    }
     var residual = distort(ideal) - distorted;
     for (var i = 0; i < MAX_STEPS; i++) {
         let j = jacobian(ideal);
@@ -91,7 +97,7 @@ fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
     }
     let j = jacobian(ideal);
     let good = length(residual * lens.focal_px) < MAX_RESIDUAL_PX
-        && length(ideal) < fold_radius(ideal)
+        && (length(ideal) < lens.fold_min || length(ideal) < fold_radius(ideal))
         && j.x * j.z - j.y * j.y > 0.0;
     if !good {
         return nothing;

@@ -19,6 +19,8 @@ struct LensUniform {
     table_distorted_max: f32,
     // Largest angle off axis (Kannala-Brandt).
     theta_max: f32,
+    // Smallest fold radius: nearer to the axis no direction matters.
+    fold_min: f32,
 }
 
 @group(0) @binding(0) var<uniform> lens: LensUniform;

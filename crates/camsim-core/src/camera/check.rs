@@ -104,3 +104,19 @@ fn samples(size: u32, stride: f64) -> Vec<f64> {
     let count = (last / stride).round().max(1.0).min(last.max(1.0));
     if size == 1 { vec![0.0] } else { (0..=count as u32).map(|i| f64::from(i) * last / count).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn winding_numbers_count_turns() {
+        let turns = |count: f64| -> Vec<DVec2> {
+            (0..100).map(|i| DVec2::from_angle(f64::from(i) * 0.01 * count * std::f64::consts::TAU)).collect()
+        };
+        for (polygon, inside) in [(turns(1.0), 1), (turns(2.0), 2), (turns(-1.0), -1)] {
+            assert_eq!(winding_number(&polygon, DVec2::new(0.2, 0.3)), inside);
+            assert_eq!(winding_number(&polygon, DVec2::new(1.2, 0.3)), 0);
+        }
+    }
+}

@@ -48,7 +48,8 @@ struct LensUniform {
     distorted_max: f32,
     table_distorted_max: f32,
     theta_max: f32,
-    padding: [f32; 3],
+    fold_min: f32,
+    padding: [f32; 2],
 }
 
 impl LensUniform {
@@ -66,7 +67,8 @@ impl LensUniform {
             distorted_max: finite_f32(camera.lens.distorted_max()),
             table_distorted_max: camera.lens.radial_table().map_or(1.0, |table| finite_f32(table.distorted_max())),
             theta_max: 0.0,
-            padding: [0.0; 3],
+            fold_min: camera.lens.fold_curve().map_or(0.0, |fold| finite_f32(fold.range().0)),
+            padding: [0.0; 2],
         };
         match &camera.lens {
             Lens::Pinhole(_) => {}
@@ -288,6 +290,7 @@ mod tests {
             ("distorted_max", offset_of!(LensUniform, distorted_max)),
             ("table_distorted_max", offset_of!(LensUniform, table_distorted_max)),
             ("theta_max", offset_of!(LensUniform, theta_max)),
+            ("fold_min", offset_of!(LensUniform, fold_min)),
         ];
         assert_eq!(offsets, mirror);
         assert_eq!(*span as usize, size_of::<LensUniform>());
