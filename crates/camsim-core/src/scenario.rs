@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 mod auto;
 mod camera;
 mod scene;
+mod validate;
 
 pub use auto::{Auto, FieldOr};
 pub use camera::{
@@ -17,6 +18,7 @@ pub use camera::{
     ZoomSpec,
 };
 pub use scene::{HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
+pub use validate::{Problem, validate};
 
 /// Everything that one run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -177,6 +179,8 @@ pub enum TrackerKind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct QualitySpec {
+    /// Whose methods: camsim's own, or the paper's.
+    pub preset: Preset,
     /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
     pub max_error_px: f64,
     /// RMS bound in 1/255 of linear range, from blur sampling and resampling.
@@ -196,6 +200,7 @@ pub struct QualitySpec {
 impl Default for QualitySpec {
     fn default() -> Self {
         Self {
+            preset: Preset::Default,
             max_error_px: 0.05,
             max_error_dn: 1.0,
             max_terrain_error_px: 0.25,
@@ -205,6 +210,17 @@ impl Default for QualitySpec {
             key_frames: Auto::Auto,
         }
     }
+}
+
+/// Sets of methods.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// The cheapest methods that keep the tolerances.
+    #[default]
+    Default,
+    /// The paper's own methods and approximations.
+    Paper,
 }
 
 /// Temporal inverse methods.

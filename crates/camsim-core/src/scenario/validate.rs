@@ -1,0 +1,303 @@
+//! Range checks: what no run could mean, each with its key and the way out.
+
+use std::fmt;
+
+use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, TrackerSpec};
+
+/// One value that no run can use.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Dotted key, array elements by index (`camera.zoom.1.at`).
+    pub key: String,
+    /// What is wrong, and what to write instead.
+    pub message: String,
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.key, self.message)
+    }
+}
+
+/// All values of `scenario` that are out of range, in the order of the file; empty when it can be run.
+pub fn validate(scenario: &Scenario) -> Vec<Problem> {
+    let mut check = Check::default();
+    check_flight(&mut check, scenario);
+    check_tracker(&mut check, &scenario.tracker);
+    check_camera(&mut check, &scenario.camera);
+    check_scene(&mut check, scenario);
+    check_quality_and_output(&mut check, scenario);
+    check.problems
+}
+
+#[derive(Default)]
+struct Check {
+    problems: Vec<Problem>,
+}
+
+impl Check {
+    fn fail(&mut self, key: impl Into<String>, message: impl Into<String>) {
+        self.problems.push(Problem { key: key.into(), message: message.into() });
+    }
+
+    fn require(&mut self, ok: bool, key: impl Into<String>, message: impl FnOnce() -> String) {
+        if !ok {
+            self.fail(key, message());
+        }
+    }
+
+    fn positive(&mut self, key: impl Into<String>, value: f64, fix: &str) {
+        self.require(value.is_finite() && value > 0.0, key, || format!("must be a finite number above 0, not {value}; {fix}"));
+    }
+
+    fn not_negative(&mut self, key: impl Into<String>, value: f64, fix: &str) {
+        self.require(value.is_finite() && value >= 0.0, key, || format!("must be a finite number, 0 or more, not {value}; {fix}"));
+    }
+
+    fn finite(&mut self, key: impl Into<String>, values: &[f64]) {
+        self.require(values.iter().all(|value| value.is_finite()), key, || format!("must be finite, not {values:?}"));
+    }
+
+    fn at_least_one(&mut self, key: &str, value: Auto<u32>) {
+        self.require(value.value() != Some(0), key, || "must be at least 1; leave it out or write \"auto\" to have it chosen".into());
+    }
+}
+
+fn check_flight(check: &mut Check, scenario: &Scenario) {
+    let flight = &scenario.flight;
+    check.require(!flight.log.as_os_str().is_empty(), "flight.log", || "is empty; give the path of the flight log".into());
+    if let Some([from, to]) = flight.window_s {
+        check.require(from.is_finite() && to.is_finite() && from < to, "flight.window_s", || {
+            format!("must be [begin, end] with begin < end, in seconds from the first row, not [{from}, {to}]")
+        });
+    }
+    check.positive("flight.speed", flight.speed, "1 flies the log in its own time, 2 twice as fast");
+    if let Origin::Geodetic([lat_deg, lon_deg, height_m]) = flight.origin {
+        let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();
+        check.require(ok, "flight.origin", || {
+            format!("must be [latitude_deg -90..90, longitude_deg, height_m], not [{lat_deg}, {lon_deg}, {height_m}]")
+        });
+    }
+}
+
+fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
+    check.require(tracker.rate_hz >= 1.0 && tracker.rate_hz <= 100_000.0, "tracker.rate_hz", || {
+        format!("must lie in 1..100000, not {}; 400 is the default", tracker.rate_hz)
+    });
+    if let Auto::Value(speed) = tracker.max_speed_m_s {
+        check.positive("tracker.max_speed_m_s", speed, "or write \"auto\"");
+    }
+    check.positive("tracker.max_acceleration_m_s2", tracker.max_acceleration_m_s2, "19.6 is the default");
+    if let Auto::Value(rate) = tracker.max_angular_rate_deg_s {
+        check.positive("tracker.max_angular_rate_deg_s", rate, "or write \"auto\"");
+    }
+    check.positive("tracker.max_angular_acceleration_deg_s2", tracker.max_angular_acceleration_deg_s2, "60 is the default");
+}
+
+/// Larger pictures than this are typing errors on every adapter there is.
+const MAX_SIDE_PX: u32 = 65_536;
+
+fn check_camera(check: &mut Check, camera: &CameraSpec) {
+    check.require(camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)), "camera.size_px", || {
+        format!("must be [width, height], each 1..{MAX_SIDE_PX}, not {:?}", camera.size_px)
+    });
+    check_focal(check, "camera.focal_px", camera.focal_px);
+    check.finite("camera.principal_point_px", &camera.principal_point_px.unwrap_or_default());
+    check.positive("camera.fps", camera.fps, "give frames per second, for example 30");
+    check.finite("camera.phase", &[camera.phase]);
+
+    check.finite("camera.mount.angles_deg", &camera.mount.angles_deg);
+    check.finite("camera.mount.offset_m", &camera.mount.offset_m);
+    for (i, vibration) in camera.mount.vibration.iter().enumerate() {
+        let key = |name: &str| format!("camera.mount.vibration.{i}.{name}");
+        check.finite(key("amplitude_deg"), &[vibration.amplitude_deg]);
+        check.finite(key("amplitude_m"), &[vibration.amplitude_m]);
+        check.not_negative(key("hz"), vibration.hz, "give the frequency in hertz");
+        check.finite(key("phase_deg"), &[vibration.phase_deg]);
+        let rotation = matches!(vibration.axis, Axis::Roll | Axis::Pitch | Axis::Yaw);
+        check.require(!rotation || vibration.amplitude_m.abs() == 0.0, key("amplitude_m"), || {
+            "does not go with a rotation axis; use amplitude_deg".into()
+        });
+        check.require(rotation || vibration.amplitude_deg.abs() == 0.0, key("amplitude_deg"), || {
+            "does not go with a translation axis; use amplitude_m".into()
+        });
+    }
+
+    check_coefficients(check, "camera.lens.coefficients", camera.lens.model, &camera.lens.coefficients);
+    for (i, zoom) in camera.zoom.iter().enumerate() {
+        check.finite(format!("camera.zoom.{i}.at"), &[zoom.at]);
+        check_focal(check, &format!("camera.zoom.{i}.focal_px"), zoom.focal_px);
+        check.finite(format!("camera.zoom.{i}.principal_point_px"), &zoom.principal_point_px.unwrap_or_default());
+        check_coefficients(check, &format!("camera.zoom.{i}.coefficients"), camera.lens.model, &zoom.coefficients);
+    }
+    for (i, pair) in camera.zoom.windows(2).enumerate() {
+        check.require(pair[0].at < pair[1].at, format!("camera.zoom.{}.at", i + 1), || {
+            format!("must be above the row before ({}), not {}; sort the table by `at`", pair[0].at, pair[1].at)
+        });
+    }
+    check.require(camera.zoom_track.is_none() || !camera.zoom.is_empty(), "camera.zoom_track", || {
+        "needs a table of calibrations; add [[camera.zoom]] entries".into()
+    });
+
+    let shutter = &camera.shutter;
+    check.not_negative("camera.shutter.delay_ms", shutter.delay_ms, "it says how much older than its stamp the image centre is");
+    check.not_negative("camera.shutter.readout_ms", shutter.readout_ms, "turn the direction with camera.shutter.readout");
+    check.not_negative("camera.shutter.exposure_ms", shutter.exposure_ms, "0 is an instant");
+    if let FieldOr::Ms(ms) = shutter.interlace_ms {
+        check.not_negative("camera.shutter.interlace_ms", ms, "choose the earlier rows with camera.shutter.first_field");
+    }
+
+    let photometric = &camera.photometric;
+    let [t1, t2] = photometric.vignette_thresholds;
+    check.require(t1.is_finite() && t2.is_finite() && t1 >= 0.0 && t2 > 0.0, "camera.photometric.vignette_thresholds", || {
+        format!("must be [t1 >= 0, t2 > 0], not [{t1}, {t2}]; [0.05, 0.5] is the default")
+    });
+    check.not_negative("camera.photometric.light", photometric.light, "1 leaves the light as it is");
+    check.not_negative("camera.photometric.noise_sigma", photometric.noise_sigma, "0 is no noise");
+}
+
+fn check_focal(check: &mut Check, key: &str, focal_px: [f64; 2]) {
+    check.require(focal_px.iter().all(|&f| f.is_finite() && f > 0.0), key, || {
+        format!("must be [fx, fy], both finite and above 0, not {focal_px:?}; a 60 degree lens on 640 px has about 554")
+    });
+}
+
+fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficients: &[f64]) {
+    check.finite(key, coefficients);
+    let (most, order) = match model {
+        LensModel::Pinhole => (0, "a pinhole has none; set camera.lens.model"),
+        LensModel::BrownConrady => (8, "the order is k1 k2 p1 p2 k3 k4 k5 k6"),
+        LensModel::KannalaBrandt => (4, "the order is k1 k2 k3 k4"),
+    };
+    check.require(coefficients.len() <= most, key, || format!("has {} values where at most {most} fit; {order}", coefficients.len()));
+}
+
+fn check_scene(check: &mut Check, scenario: &Scenario) {
+    let scene = &scenario.scene;
+    check.require(scene.terrain.is_some() || scene.pattern.is_some(), "scene", || {
+        "is empty; give scene.terrain = { dem = \"dem.tif\" } or scene.pattern = { image = \"grid.png\", width_m = 100.0 }".into()
+    });
+    if let Some(pattern) = &scene.pattern {
+        check.positive("scene.pattern.width_m", pattern.width_m, "give the width on the ground in metres");
+        if let PatternCentre::Ned(centre) = pattern.at {
+            check.finite("scene.pattern.at", &centre);
+        }
+    }
+    check.require(scene.sky.iter().all(|value| (0.0..=1.0).contains(value)), "scene.sky", || {
+        format!("must be sRGB values in 0..1, not {:?}; divide 8-bit values by 255", scene.sky)
+    });
+    if let Some(visibility_m) = scene.fog_visibility_m {
+        check.positive("scene.fog_visibility_m", visibility_m, "leave it out for clear air");
+    }
+}
+
+fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
+    let quality = &scenario.quality;
+    check.require(quality.preset == Preset::Default, "quality.preset", || {
+        "\"paper\" is not supported by this version; leave it out or write \"default\"".into()
+    });
+    check.positive("quality.max_error_px", quality.max_error_px, "0.05 is the default");
+    check.positive("quality.max_error_dn", quality.max_error_dn, "1 is the default");
+    check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
+    check.at_least_one("quality.blur_samples", quality.blur_samples);
+    check.at_least_one("quality.footprint_taps", quality.footprint_taps);
+    check.at_least_one("quality.key_frames", quality.key_frames);
+    check.require(!scenario.output.channels.is_empty(), "output.channels", || {
+        "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::scenario::{FlightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+
+    fn good() -> Scenario {
+        Scenario {
+            seed: 0,
+            flight: FlightSpec {
+                log: "flight.csv".into(),
+                format: Default::default(),
+                angles: Default::default(),
+                attitude: Default::default(),
+                origin: Default::default(),
+                height: Default::default(),
+                window_s: None,
+                speed: 1.0,
+            },
+            tracker: Default::default(),
+            camera: Default::default(),
+            scene: SceneSpec {
+                pattern: Some(PatternSpec { image: "grid.png".into(), width_m: 100.0, at: Default::default() }),
+                ..Default::default()
+            },
+            quality: Default::default(),
+            output: Default::default(),
+        }
+    }
+
+    #[test]
+    fn the_defaults_are_in_range() {
+        assert_eq!(validate(&good()), []);
+    }
+
+    #[test]
+    fn each_value_out_of_range_is_named_once() {
+        type Edit = fn(&mut Scenario);
+        let cases: &[(&str, Edit)] = &[
+            ("flight.log", |s| s.flight.log = PathBuf::new()),
+            ("flight.window_s", |s| s.flight.window_s = Some([5.0, 2.0])),
+            ("flight.window_s", |s| s.flight.window_s = Some([0.0, f64::NAN])),
+            ("flight.speed", |s| s.flight.speed = 0.0),
+            ("flight.origin", |s| s.flight.origin = Origin::Geodetic([91.0, 0.0, 0.0])),
+            ("tracker.rate_hz", |s| s.tracker.rate_hz = f64::NAN),
+            ("tracker.max_speed_m_s", |s| s.tracker.max_speed_m_s = Auto::Value(-1.0)),
+            ("tracker.max_acceleration_m_s2", |s| s.tracker.max_acceleration_m_s2 = f64::INFINITY),
+            ("camera.size_px", |s| s.camera.size_px = [640, 0]),
+            ("camera.size_px", |s| s.camera.size_px = [u32::MAX, 480]),
+            ("camera.focal_px", |s| s.camera.focal_px = [0.0, 500.0]),
+            ("camera.focal_px", |s| s.camera.focal_px = [500.0, f64::NAN]),
+            ("camera.principal_point_px", |s| s.camera.principal_point_px = Some([f64::INFINITY, 0.0])),
+            ("camera.fps", |s| s.camera.fps = -30.0),
+            ("camera.phase", |s| s.camera.phase = f64::NAN),
+            ("camera.mount.angles_deg", |s| s.camera.mount.angles_deg[1] = f64::NAN),
+            ("camera.mount.vibration.0.amplitude_m", |s| {
+                let wrong = VibrationSpec { axis: Axis::Roll, amplitude_deg: 0.1, amplitude_m: 0.1, hz: 50.0, phase_deg: 0.0 };
+                s.camera.mount.vibration.push(wrong);
+            }),
+            ("camera.lens.coefficients", |s| s.camera.lens.coefficients = vec![0.1]),
+            ("camera.lens.coefficients", |s| {
+                s.camera.lens.model = LensModel::KannalaBrandt;
+                s.camera.lens.coefficients = vec![0.0; 5];
+            }),
+            ("camera.zoom.1.at", |s| {
+                let row = |at| ZoomSpec { at, focal_px: [500.0, 500.0], principal_point_px: None, coefficients: vec![] };
+                s.camera.zoom = vec![row(2.0), row(1.0)];
+            }),
+            ("camera.zoom_track", |s| s.camera.zoom_track = Some("zoom.csv".into())),
+            ("camera.shutter.delay_ms", |s| s.camera.shutter.delay_ms = -1.0),
+            ("camera.shutter.readout_ms", |s| s.camera.shutter.readout_ms = f64::NAN),
+            ("camera.shutter.exposure_ms", |s| s.camera.shutter.exposure_ms = -8.0),
+            ("camera.shutter.interlace_ms", |s| s.camera.shutter.interlace_ms = FieldOr::Ms(-1.0)),
+            ("camera.photometric.vignette_thresholds", |s| s.camera.photometric.vignette_thresholds = [0.0, 0.0]),
+            ("camera.photometric.light", |s| s.camera.photometric.light = -1.0),
+            ("camera.photometric.noise_sigma", |s| s.camera.photometric.noise_sigma = f64::NAN),
+            ("scene", |s| s.scene.pattern = None),
+            ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
+            ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
+            ("quality.preset", |s| s.quality.preset = Preset::Paper),
+            ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
+            ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
+            ("output.channels", |s| s.output.channels.clear()),
+        ];
+        for (key, edit) in cases {
+            let mut scenario = good();
+            edit(&mut scenario);
+            let problems = validate(&scenario);
+            assert_eq!(problems.len(), 1, "{key}: {problems:?}");
+            assert_eq!(problems[0].key, *key);
+        }
+    }
+}
