@@ -19,3 +19,5 @@ pub mod load;
 pub mod write;
 
 pub mod manifest;
+
+pub mod compare;
