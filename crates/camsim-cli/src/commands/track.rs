@@ -1,16 +1,13 @@
 //! `camsim track`: the platform's motion without any picture.
 
-use std::{
-    io::{self, Write},
-    path::PathBuf,
-};
+use std::path::PathBuf;
 
 use anyhow::anyhow;
 use camsim_core::{
-    pose::BodyState,
     tracker::{Channels, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
     trajectory::Trajectory,
 };
+use camsim_io::write::trajectory_csv;
 use serde::Serialize;
 
 use crate::{
@@ -18,13 +15,11 @@ use crate::{
     failure::{Failure, OrFail},
     inputs::{self, ScenarioArgs},
     output::write_output,
+    render_run,
 };
 
-/// Columns of the trajectory file: q takes body (FRD) to NED, rates are in body axes, t_s is on the log's clock.
-pub const COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
-
-/// Rows that a trajectory file may have: a hundred hours at 400 Hz.
-const MOST_ROWS: f64 = 150e6;
+/// Rows that a trajectory file may have: the table is made in memory, about 300 bytes a row.
+const MOST_ROWS: f64 = 10e6;
 
 /// Follow the flight log and print the motion, without pictures
 ///
@@ -69,9 +64,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
     let rows = row_count(&tracked.trajectory, rate_hz)?;
     if args.output.is_some() || !args.report {
-        write_output(args.output.as_deref(), console, |out| {
-            write_rows(out, &tracked.trajectory, loaded.sequence.epoch_ns, rate_hz, rows)
-        })?;
+        let trajectory = &tracked.trajectory;
+        let last_s = trajectory.span_s().0 + (rows - 1) as f64 / rate_hz;
+        let records = render_run::motion(trajectory, loaded.sequence.epoch_ns, rate_hz, [trajectory.span_s().0, last_s]);
+        let table = trajectory_csv(records);
+        write_output(args.output.as_deref(), console, |out| out.write_all(table.as_bytes()))?;
     }
     if let Some(path) = &args.output {
         console.note(format_args!("{rows} rows in {}", path.display()));
@@ -93,31 +90,6 @@ fn row_count(trajectory: &Trajectory, rate_hz: f64) -> Result<u64, Failure> {
         return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: {rows:.0} rows are more than {MOST_ROWS:.0}; lower the rate")));
     }
     Ok(rows as u64)
-}
-
-/// Rows at `start + k / rate_hz`.
-fn write_rows(out: &mut dyn Write, trajectory: &Trajectory, epoch_ns: i64, rate_hz: f64, rows: u64) -> io::Result<()> {
-    writeln!(out, "{COLUMNS}")?;
-    let start_s = trajectory.span_s().0;
-    for k in 0..rows {
-        let t_s = start_s + k as f64 / rate_hz;
-        write_row(out, epoch_ns, t_s, &trajectory.state(t_s))?;
-    }
-    Ok(())
-}
-
-fn write_row(out: &mut dyn Write, epoch_ns: i64, t_s: f64, state: &BodyState) -> io::Result<()> {
-    // Whole nanoseconds: seconds since 1970 have no room for them in a float.
-    let t_ns = i128::from(epoch_ns) + (t_s * 1e9).round() as i128;
-    let sign = if t_ns < 0 { "-" } else { "" };
-    write!(out, "{sign}{}.{:09}", t_ns.unsigned_abs() / 1_000_000_000, t_ns.unsigned_abs() % 1_000_000_000)?;
-    let q = state.ned_from_body;
-    let vectors = [state.position_ned_m, state.velocity_ned_m_s, state.acceleration_ned_m_s2].into_iter().flat_map(|v| v.to_array());
-    let rates = [state.rate_body_rad_s, state.angular_acceleration_body_rad_s2].into_iter().flat_map(|v| v.to_array());
-    for value in vectors.chain([q.w, q.x, q.y, q.z]).chain(rates) {
-        write!(out, ",{value:?}")?;
-    }
-    writeln!(out)
 }
 
 fn report(json: bool, tracked: &Tracked, measured: &TrackReport, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -169,6 +141,7 @@ fn motion(used: &MotionUse, limits: &ResolvedLimits, held: &Saturation) -> [(&'s
 mod tests {
     #![allow(clippy::unwrap_used)]
 
+    use camsim_core::pose::BodyState;
     use glam::{DQuat, DVec3};
 
     use super::*;
@@ -181,20 +154,6 @@ mod tests {
             ned_from_body: DQuat::IDENTITY,
             rate_body_rad_s: DVec3::ZERO,
             angular_acceleration_body_rad_s2: DVec3::ZERO,
-        }
-    }
-
-    #[test]
-    fn a_row_has_every_column_and_exact_time() {
-        for (epoch_ns, t_s, wanted) in
-            [(1_403_636_579_763_555_584, 0.5, "1403636580.263555584"), (0, 0.0, "0.000000000"), (-1_500_000_000, 0.25, "-1.250000000")]
-        {
-            let mut row = Vec::new();
-            write_row(&mut row, epoch_ns, t_s, &still()).unwrap();
-            let row = String::from_utf8(row).unwrap();
-            let cells: Vec<&str> = row.trim().split(',').collect();
-            assert_eq!(cells.len(), COLUMNS.split(',').count());
-            assert_eq!((cells[0], cells[3], cells[10]), (wanted, "-3.0", "1.0"));
         }
     }
 

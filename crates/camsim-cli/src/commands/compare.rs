@@ -1,0 +1,1 @@
+//! `camsim compare`.
