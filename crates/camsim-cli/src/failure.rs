@@ -119,7 +119,10 @@ mod tests {
     #[test]
     fn causes_are_listed_once() {
         let deep = anyhow::anyhow!("disk full").context("frame_000001.exr: cannot be written: disk full").context("rendering stopped");
-        assert_eq!(Failure::failed(deep).to_string(), "error: rendering stopped\n  caused by: frame_000001.exr: cannot be written: disk full");
+        assert_eq!(
+            Failure::failed(deep).to_string(),
+            "error: rendering stopped\n  caused by: frame_000001.exr: cannot be written: disk full"
+        );
     }
 
     #[test]

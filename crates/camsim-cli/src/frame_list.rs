@@ -32,11 +32,16 @@ pub enum FrameListError {
 impl fmt::Display for FrameListError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Syntax(part) => write!(f, "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas"),
+            Self::Syntax(part) => {
+                write!(f, "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas")
+            }
             Self::Empty(part) => write!(f, "`{part}` holds no frame: the end must be above the start"),
             Self::Outside { frame, frames } => {
                 let last = frames.saturating_sub(1);
-                write!(f, "--frames asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps")
+                write!(
+                    f,
+                    "--frames asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps"
+                )
             }
         }
     }

@@ -6,13 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use camsim_core::{
-    plan::Planner,
-    scenario::Scenario,
-    sequence::Sequence,
-    shutter::Shutter,
-    trajectory::Trajectory,
-};
+use camsim_core::{plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
 use camsim_gpu::{Engine, engine::Finished};
 use camsim_io::{
     manifest::{ResumeError, RunManifest, check_resume, in_shard},
@@ -156,12 +150,7 @@ fn trajectory_records(
 }
 
 /// States at `start + k / rate_hz` that enclose `seen_s`; outside of the log the platform coasts.
-pub fn motion(
-    trajectory: &Trajectory,
-    epoch_ns: i64,
-    rate_hz: f64,
-    seen_s: [f64; 2],
-) -> impl Iterator<Item = TrajectoryRecord> + use<'_> {
+pub fn motion(trajectory: &Trajectory, epoch_ns: i64, rate_hz: f64, seen_s: [f64; 2]) -> impl Iterator<Item = TrajectoryRecord> + use<'_> {
     let start_s = trajectory.span_s().0;
     let tick = |t_s: f64| (t_s - start_s) * rate_hz;
     let (first, last) = ((tick(seen_s[0]) + 1e-6).floor() as i64, (tick(seen_s[1]) - 1e-6).ceil() as i64);

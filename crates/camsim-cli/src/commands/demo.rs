@@ -62,8 +62,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read()?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
-    let job =
-        Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
+    let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
     let mut thumbnails = Vec::new();
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;
@@ -120,7 +119,7 @@ fn without_flaws(sequence: &Sequence) -> Result<Sequence, Failure> {
 fn render_one(engine: &Engine, sequence: &Arc<Sequence>, frame: u64) -> Result<RenderedFrame, Failure> {
     let mut rendered = RenderedFrame::default();
     let mut session = engine.session::<WriteError>(sequence.clone(), &sequence.scenario.output.channels)?;
-    session.render([frame], &mut |finished| {
+    session.render::<WriteError>([frame], &mut |finished| {
         rendered = finished.frame;
         Ok(())
     })?;

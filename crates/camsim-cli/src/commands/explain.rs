@@ -108,7 +108,10 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
         south_west_deg[0], north_east_deg[0], south_west_deg[1], north_east_deg[1], height_range_m[0], height_range_m[1]
     ))?;
     let (voids, outside) = (terrain.void_heights, terrain.outside_ortho);
-    console.line(format_args!("  {voids} heights missing, {outside} outside of the ortho-image, {} triangles at the finest level", terrain.finest_triangles))?;
+    console.line(format_args!(
+        "  {voids} heights missing, {outside} outside of the ortho-image, {} triangles at the finest level",
+        terrain.finest_triangles
+    ))?;
     Ok(())
 }
 

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, Read, Write},
+    io::{self, Read},
     path::{Path, PathBuf},
 };
 
@@ -144,7 +144,8 @@ fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DV
 }
 
 fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
     let mut places = None;
     let mut points = Vec::new();
     for record in reader.records() {
@@ -162,7 +163,9 @@ fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec
         let places = *places.get_or_insert([0, 1]);
         let number = |i: usize| -> anyhow::Result<f64> {
             let text = record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
-            text.parse().map_err(|_| anyhow!("line {line}: {} is `{text}`, which is no number; expected the columns {}", columns[i], columns.join(",")))
+            text.parse().map_err(|_| {
+                anyhow!("line {line}: {} is `{text}`, which is no number; expected the columns {}", columns[i], columns.join(","))
+            })
         };
         points.push(DVec2::new(number(0)?, number(1)?));
     }
@@ -186,7 +189,12 @@ mod tests {
     #[test]
     fn points_are_read_by_name_or_by_place() {
         let both = vec![DVec2::new(1.0, 2.0), DVec2::new(-3.5, 4e-3)];
-        for text in ["u,v\n1,2\n-3.5,4e-3\n", "1,2\n-3.5,0.004", "\u{feff}id, V ,u\r\n7,2,1\r\n8,4e-3,-3.5\r\n", "# rays\nu,v\n1,2\n# more\n-3.5,4e-3\n"] {
+        for text in [
+            "u,v\n1,2\n-3.5,4e-3\n",
+            "1,2\n-3.5,0.004",
+            "\u{feff}id, V ,u\r\n7,2,1\r\n8,4e-3,-3.5\r\n",
+            "# rays\nu,v\n1,2\n# more\n-3.5,4e-3\n",
+        ] {
             assert_eq!(parse_points(text.as_bytes(), UV).unwrap(), both, "{text}");
         }
         assert_eq!(parse_points("".as_bytes(), UV).unwrap(), []);

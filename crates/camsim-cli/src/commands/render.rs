@@ -79,13 +79,8 @@ enum Format {
     None,
 }
 
-const CHANNELS: [(&str, Channel); 5] = [
-    ("color", Channel::Color),
-    ("depth", Channel::Depth),
-    ("valid", Channel::Valid),
-    ("rows", Channel::Rows),
-    ("coords", Channel::Coords),
-];
+const CHANNELS: [(&str, Channel); 5] =
+    [("color", Channel::Color), ("depth", Channel::Depth), ("valid", Channel::Valid), ("rows", Channel::Rows), ("coords", Channel::Coords)];
 
 fn channel_parser() -> impl TypedValueParser<Value = Channel> {
     PossibleValuesParser::new(CHANNELS.map(|(name, _)| name)).try_map(|name| {

@@ -74,7 +74,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console.note(format_args!("{rows} rows in {}", path.display()));
     }
     if args.report {
-        let measured = tracked.report(&loaded.log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
+        let measured =
+            tracked.report(&loaded.log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
         report(args.json, tracked, &measured, console)?;
     }
     Ok(())
