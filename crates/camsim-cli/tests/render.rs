@@ -27,9 +27,11 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     let temporary = tempfile::tempdir().unwrap();
     let (whole, parts) = (temporary.path().join("whole"), temporary.path().join("parts"));
     let render = |folder: &Path, more: &[&str]| {
-        let common = ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,rows", "--format", "exr,png"];
+        let common =
+            ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,rows", "--format", "exr,png"];
         // A small camera: the order of frames is what matters here.
-        let small = ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
+        let small =
+            ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
         camsim(&[&common[..], &small, &["--set", "camera.photometric.noise_sigma=0.01"], more].concat())
     };
     let (code, out, err) = render(&whole, &["--frames", "2..6"]);
