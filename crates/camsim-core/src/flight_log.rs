@@ -1,14 +1,191 @@
-//! Flight log: poses of the platform over time.
+//! The flight log: rows of time, position and attitude, cleaned and brought to one local north-east-down frame.
+//!
+//! [`RawRow`]s come from a reader (camsim-io) as the file states them; [`FlightLog::from_raw`] cleans them and counts every repair in a
+//! [`CleaningReport`]. Nothing is repaired silently. The steps, in order:
+//!
+//! 1. rows without a usable time or position are dropped; unusable attitudes are marked as missing;
+//! 2. rows are sorted stably by time;
+//! 3. heights change datum, positions become local NED, angles become rotations or (where turns count) stay angles;
+//! 4. position spikes are dropped, attitude glitches are marked as missing (`outliers`);
+//! 5. rows less than 1 ms apart are averaged into one;
+//! 6. missing attitudes are interpolated between their neighbours, or all are computed from the track (`track_attitude`);
+//! 7. time is scaled, gaps are counted, rows with more than 90 degrees of turn between them get rows in between.
 
 use glam::{DQuat, DVec3};
 
-/// One good row of a flight log.
+use crate::{
+    geodesy::{Geodetic, LocalFrame},
+    scenario::{AngleKind, AttitudeSource, FlightSpec, Origin},
+};
+
+mod attitude;
+mod clean;
+mod outliers;
+mod query;
+mod report;
+mod track_attitude;
+
+pub use attitude::body_from_euler_deg;
+pub use report::{CleaningReport, Finding};
+
+/// Position of a row as its file states it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RawPosition {
+    /// On WGS-84; the attitude of such a row is relative to the tangent frame at that point.
+    Geodetic(Geodetic),
+    /// Local north, east, down in metres; the attitude of such a row is relative to the same axes.
+    Ned(DVec3),
+}
+
+/// Attitude of a row as its file states it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RawAttitude {
+    /// Roll, pitch, yaw of the body (FRD), ZYX, degrees.
+    EulerDeg([f64; 3]),
+    /// Takes body (FRD) to north-east-down; any norm within 10 % of 1.
+    Quaternion(DQuat),
+    /// The file states none.
+    None,
+}
+
+/// One row of a log before cleaning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RawRow {
+    /// Line of the file, from 1; only for reports.
+    pub line: usize,
+    /// Log clock in nanoseconds; `None` where the file's time is not a finite number.
+    pub t_ns: Option<i64>,
+    /// Position.
+    pub position: RawPosition,
+    /// Attitude.
+    pub attitude: RawAttitude,
+}
+
+/// One row of a cleaned log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogRow {
-    /// Seconds since the first good row.
+    /// Seconds since the first good row, divided by the `speed` factor; strictly increasing.
     pub t_s: f64,
-    /// Position in NED, metres.
+    /// Position in local NED, metres.
     pub position_ned_m: DVec3,
-    /// Rotation that takes body (FRD) coordinates to NED.
+    /// Takes body (FRD) coordinates to local NED; unit length.
     pub ned_from_body: DQuat,
 }
+
+/// Change of vertical datum while a log is read. If log and terrain share a datum, none is needed: that is the caller's decision.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HeightConversion {
+    /// Heights stay as they are.
+    #[default]
+    None,
+    /// Heights above mean sea level (EGM96) become heights above the ellipsoid.
+    MslToEllipsoid,
+    /// Heights above the ellipsoid become heights above mean sea level (EGM96).
+    EllipsoidToMsl,
+}
+
+/// How raw rows become a log.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogOptions {
+    /// Whether angles wrap or count turns.
+    pub angles: AngleKind,
+    /// Where attitude comes from.
+    pub attitude: AttitudeSource,
+    /// Origin of the local frame: `None` is the first good row of a geodetic log, after `height`. A given origin is in the datum
+    /// *after* `height`. For a log in local coordinates it says where on earth (0, 0, 0) is.
+    pub origin: Option<Geodetic>,
+    /// Change of vertical datum of geodetic rows.
+    pub height: HeightConversion,
+    /// Time scale: 2 flies the log twice as fast. Positive.
+    pub speed: f64,
+}
+
+impl Default for LogOptions {
+    fn default() -> Self {
+        Self { angles: AngleKind::Auto, attitude: AttitudeSource::Log, origin: None, height: HeightConversion::None, speed: 1.0 }
+    }
+}
+
+impl LogOptions {
+    /// The options of a scenario's `[flight]`.
+    pub fn from_spec(spec: &FlightSpec, height: HeightConversion) -> Self {
+        let origin = match spec.origin {
+            Origin::First => None,
+            Origin::Geodetic([lat_deg, lon_deg, height_m]) => Some(Geodetic::from_deg(lat_deg, lon_deg, height_m)),
+        };
+        Self { angles: spec.angles, attitude: spec.attitude, origin, height, speed: spec.speed }
+    }
+}
+
+/// What makes a log unusable.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LogError {
+    /// No rows at all.
+    #[error("the log has no rows")]
+    Empty,
+    /// Rows, but none usable.
+    #[error("none of the log's {rows} rows has a finite time and position (first: line {line})")]
+    NoGoodRow {
+        /// Rows read.
+        rows: usize,
+        /// Line of the first.
+        line: usize,
+    },
+    /// Neither columns nor usable values of attitude.
+    #[error("the log has no usable attitude; set flight.attitude = \"track\" to derive it from the track")]
+    NoAttitude,
+    /// Geodetic and local rows in one log.
+    #[error("line {line}: the log mixes geodetic and local positions; keep one kind per file")]
+    MixedPositions {
+        /// First line of the other kind.
+        line: usize,
+    },
+    /// Some rows with angles, others with quaternions.
+    #[error("line {line}: the log mixes Euler angles and quaternions; keep one kind per file")]
+    MixedAttitudes {
+        /// First line of the other kind.
+        line: usize,
+    },
+    /// `flight.speed` is not usable.
+    #[error("flight.speed = {0} must be a positive finite number")]
+    BadSpeed(f64),
+    /// `flight.origin` is not usable.
+    #[error("flight.origin must be [lat_deg within +-90, lon_deg within +-360, height_m], all finite")]
+    BadOrigin,
+    /// A continuous angle jumps by thousands of turns.
+    #[error(
+        "line {line}: angles jump by {degrees:.0} degrees from the row before; if they wrap, set flight.angles = \"wrapped\", else repair the row"
+    )]
+    TurnTooLarge {
+        /// Line of the later row.
+        line: usize,
+        /// Sum of the three angles' changes.
+        degrees: f64,
+    },
+}
+
+/// A cleaned log, ready for the tracker. Has at least one row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlightLog {
+    /// Rows by strictly increasing time.
+    pub rows: Vec<LogRow>,
+    /// Log clock at `t_s = 0`, nanoseconds.
+    pub epoch_ns: i64,
+    /// The local frame on earth; `None` for a log in local coordinates without a geodetic origin.
+    pub frame: Option<LocalFrame>,
+    /// What was repaired.
+    pub report: CleaningReport,
+}
+
+impl FlightLog {
+    /// Cleans raw rows; see the module's list of steps.
+    ///
+    /// # Errors
+    /// [`LogError`]: nothing usable in the rows, or unusable options.
+    pub fn from_raw(raw: &[RawRow], options: &LogOptions) -> Result<Self, LogError> {
+        clean::clean(raw, options)
+    }
+}
+
+#[cfg(test)]
+mod tests;

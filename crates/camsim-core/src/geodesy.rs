@@ -79,8 +79,7 @@ impl Geodetic {
         // Two rounds reach 1e-12 rad from -10 km to 1000 km; the rest costs nothing because the loop stops.
         for _ in 0..10 {
             let (sin_r, cos_r) = reduced.sin_cos();
-            let next_lat =
-                (ecef_m.z + second_e2 * semi_minor_m * sin_r.powi(3)).atan2(from_axis_m - WGS84_E2 * WGS84_A_M * cos_r.powi(3));
+            let next_lat = (ecef_m.z + second_e2 * semi_minor_m * sin_r.powi(3)).atan2(from_axis_m - WGS84_E2 * WGS84_A_M * cos_r.powi(3));
             let done = (next_lat - lat_rad).abs() < 1e-16;
             lat_rad = next_lat;
             reduced = ((1.0 - WGS84_F) * lat_rad.sin()).atan2(lat_rad.cos());

@@ -24,7 +24,11 @@ fn round_trip_at_the_awkward_places() {
             for height in [-10_000.0, -1.0, 0.0, 1078.0, 12_000.0, 1.0e6] {
                 let ecef = Geodetic::from_deg(lat, lon, height).to_ecef();
                 let back = Geodetic::from_ecef(ecef);
-                assert!((back.to_ecef() - ecef).length() < 2.0 * ECEF_ROUNDING_M, "{lat} {lon} {height}: {:e}", (back.to_ecef() - ecef).length());
+                assert!(
+                    (back.to_ecef() - ecef).length() < 2.0 * ECEF_ROUNDING_M,
+                    "{lat} {lon} {height}: {:e}",
+                    (back.to_ecef() - ecef).length()
+                );
                 assert!((back.height_m - height).abs() < ECEF_ROUNDING_M, "{lat} {lon} {height} -> {}", back.height_m);
                 assert!((back.lat_deg() - lat).abs() < 1e-13, "{lat} {lon} {height} -> {}", back.lat_deg());
             }

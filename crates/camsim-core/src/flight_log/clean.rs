@@ -1,0 +1,319 @@
+//! The steps from raw rows to a log, in order.
+
+use glam::DVec3;
+
+use super::{
+    CleaningReport, FlightLog, HeightConversion, LogError, LogOptions, LogRow, RawAttitude, RawPosition, RawRow,
+    attitude::{self, Attitude},
+    outliers::{self, Channel},
+    track_attitude,
+};
+use crate::{
+    geodesy::{Geodetic, GeoidCache, LocalFrame},
+    scenario::{AngleKind, AttitudeSource},
+};
+
+/// Rows closer than this are one row written twice: their velocity would be rounding noise (the FSR2015 log has steps of 50 us).
+const MERGE_NS: i128 = 1_000_000;
+const GAP_S: f64 = 1.0;
+/// No position further from the origin than this is a position.
+const MAX_DISTANCE_M: f64 = 1e8;
+/// Smallest deviation of a position that counts as a spike.
+const SPIKE_FLOOR_M: f64 = 0.05;
+/// Smallest deviation of an attitude that counts as a glitch.
+const GLITCH_FLOOR_RAD: f64 = 2.0 * std::f64::consts::PI / 180.0;
+/// Rows put between two rows; 2500 turns in one step are not a flight.
+const MAX_PIECES: f64 = 10_000.0;
+
+/// A row on its way: position in local NED, attitude relative to its own tangent frame.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    line: usize,
+    t_ns: i64,
+    position_ned_m: DVec3,
+    attitude: Attitude,
+}
+
+pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, LogError> {
+    check_options(options)?;
+    let first = raw.first().ok_or(LogError::Empty)?;
+    let mut report = CleaningReport { rows_read: raw.len(), ..CleaningReport::default() };
+
+    let mut usable = drop_unusable(raw, &mut report);
+    if usable.is_empty() {
+        return Err(LogError::NoGoodRow { rows: raw.len(), line: first.line });
+    }
+    check_one_kind(&usable)?;
+    sort_by_time(&mut usable, &mut report);
+
+    let uses_log_attitude = options.attitude == AttitudeSource::Log;
+    let continuous = uses_log_attitude && attitude::is_continuous(&usable, options.angles);
+    report.angles = if continuous { AngleKind::Continuous } else { AngleKind::Wrapped };
+    let (mut rows, frame) = localise(&usable, options, continuous);
+    // Attitudes of local logs are relative to the frame's own axes, wherever the row is.
+    let tangent_frame = frame.filter(|_| matches!(usable[0].position, RawPosition::Geodetic(_)));
+
+    drop_spikes(&mut rows, &mut report);
+    if uses_log_attitude {
+        if rows.iter().all(|row| row.attitude.is_missing()) {
+            return Err(LogError::NoAttitude);
+        }
+        mark_attitudes(&mut rows, &mut report);
+    }
+    merge(&mut rows, &mut report);
+    if uses_log_attitude {
+        fill_attitudes(&mut rows);
+    }
+    count_gaps(&rows, &mut report);
+    if continuous {
+        rows = insert_turns(&rows, &mut report)?;
+    }
+
+    let epoch_ns = rows[0].t_ns;
+    let mut log_rows: Vec<LogRow> = rows
+        .iter()
+        .map(|row| {
+            let ned_from_local = tangent_frame.map(|frame| frame.ned_from_local(frame.geodetic_from_ned(row.position_ned_m)));
+            let local_from_body = row.attitude.rotation();
+            LogRow {
+                t_s: seconds_between(epoch_ns, row.t_ns) / options.speed,
+                position_ned_m: row.position_ned_m,
+                ned_from_body: ned_from_local.map_or(local_from_body, |rotation| (rotation * local_from_body).normalize()),
+            }
+        })
+        .collect();
+    if !uses_log_attitude {
+        track_attitude::fill(&mut log_rows, tangent_frame.as_ref());
+    }
+    Ok(FlightLog { rows: log_rows, epoch_ns, frame, report })
+}
+
+fn check_options(options: &LogOptions) -> Result<(), LogError> {
+    if !(options.speed > 0.0 && options.speed.is_finite()) {
+        return Err(LogError::BadSpeed(options.speed));
+    }
+    if options.origin.is_some_and(|origin| !origin.is_valid()) {
+        return Err(LogError::BadOrigin);
+    }
+    Ok(())
+}
+
+fn drop_unusable<'a>(raw: &'a [RawRow], report: &mut CleaningReport) -> Vec<&'a RawRow> {
+    raw.iter()
+        .filter(|row| {
+            let has_position = match row.position {
+                RawPosition::Geodetic(at) => at.is_valid(),
+                // Also false for NaN.
+                RawPosition::Ned(ned) => ned.abs().max_element() <= MAX_DISTANCE_M && !ned.is_nan(),
+            };
+            let good = has_position && row.t_ns.is_some();
+            if !good {
+                report.unusable.add(row.line);
+            }
+            good
+        })
+        .collect()
+}
+
+fn check_one_kind(rows: &[&RawRow]) -> Result<(), LogError> {
+    let is_geodetic = |row: &RawRow| matches!(row.position, RawPosition::Geodetic(_));
+    if let Some(other) = rows.iter().find(|row| is_geodetic(row) != is_geodetic(rows[0])) {
+        return Err(LogError::MixedPositions { line: other.line });
+    }
+    let is_euler = |row: &RawRow| match row.attitude {
+        RawAttitude::EulerDeg(_) => Some(true),
+        RawAttitude::Quaternion(_) => Some(false),
+        RawAttitude::None => None,
+    };
+    let kind = rows.iter().find_map(|row| is_euler(row));
+    match rows.iter().find(|row| is_euler(row).is_some_and(|euler| Some(euler) != kind)) {
+        Some(other) => Err(LogError::MixedAttitudes { line: other.line }),
+        None => Ok(()),
+    }
+}
+
+fn sort_by_time(rows: &mut [&RawRow], report: &mut CleaningReport) {
+    let mut latest = None;
+    for row in rows.iter() {
+        if row.t_ns < latest {
+            report.out_of_order.add(row.line);
+        }
+        latest = latest.max(row.t_ns);
+    }
+    rows.sort_by_key(|row| row.t_ns);
+}
+
+/// Positions to local NED, angles to attitudes; also gives the frame.
+fn localise(usable: &[&RawRow], options: &LogOptions, continuous: bool) -> (Vec<Row>, Option<LocalFrame>) {
+    let mut geoid = GeoidCache::new();
+    let mut convert = |at: Geodetic| match options.height {
+        HeightConversion::None => at,
+        HeightConversion::MslToEllipsoid => Geodetic { height_m: at.height_m + geoid.undulation_m(at), ..at },
+        HeightConversion::EllipsoidToMsl => Geodetic { height_m: at.height_m - geoid.undulation_m(at), ..at },
+    };
+    let mut frame = options.origin.map(LocalFrame::new);
+    let rows = usable
+        .iter()
+        .filter_map(|row| {
+            let position_ned_m = match row.position {
+                RawPosition::Geodetic(at) => {
+                    let at = convert(at);
+                    frame.get_or_insert_with(|| LocalFrame::new(at)).ned_from_geodetic(at)
+                }
+                RawPosition::Ned(ned) => ned,
+            };
+            row.t_ns.map(|t_ns| Row { line: row.line, t_ns, position_ned_m, attitude: Attitude::from_raw(row.attitude, continuous) })
+        })
+        .collect();
+    (rows, frame)
+}
+
+struct Positions<'a>(&'a [Row]);
+
+impl Channel for Positions<'_> {
+    fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64 {
+        let (a, b) = (self.0[before].position_ned_m, self.0[after].position_ned_m);
+        (a + (b - a) * fraction).distance(self.0[row].position_ned_m)
+    }
+
+    fn distance(&self, a: usize, b: usize) -> f64 {
+        self.0[a].position_ned_m.distance(self.0[b].position_ned_m)
+    }
+}
+
+struct Attitudes<'a>(&'a [Row]);
+
+impl Channel for Attitudes<'_> {
+    fn deviation(&self, row: usize, before: usize, after: usize, fraction: f64) -> f64 {
+        let (a, b) = (self.0[before].attitude, self.0[after].attitude);
+        if a.is_missing() || b.is_missing() {
+            return f64::NAN;
+        }
+        a.interpolate(b, fraction).distance_rad(self.0[row].attitude).unwrap_or(f64::NAN)
+    }
+
+    fn distance(&self, a: usize, b: usize) -> f64 {
+        self.0[a].attitude.distance_rad(self.0[b].attitude).unwrap_or(f64::NAN)
+    }
+}
+
+/// Drops position spikes. If the first row goes, the origin of a geodetic log stays where that row put it.
+fn drop_spikes(rows: &mut Vec<Row>, report: &mut CleaningReport) {
+    let is_spike = outliers::find(&times_s(rows), &Positions(rows), SPIKE_FLOOR_M);
+    let mut flags = is_spike.iter();
+    rows.retain(|row| {
+        let spike = flags.next().copied().unwrap_or(false);
+        if spike {
+            report.position_spikes.add(row.line);
+        }
+        !spike
+    });
+}
+
+/// Counts missing attitudes and turns glitches into missing ones.
+fn mark_attitudes(rows: &mut [Row], report: &mut CleaningReport) {
+    for row in rows.iter().filter(|row| row.attitude.is_missing()) {
+        report.attitude_missing.add(row.line);
+    }
+    let is_glitch = outliers::find(&times_s(rows), &Attitudes(rows), GLITCH_FLOOR_RAD);
+    for (row, _) in rows.iter_mut().zip(is_glitch).filter(|(_, glitch)| *glitch) {
+        report.attitude_glitches.add(row.line);
+        row.attitude = Attitude::Missing;
+    }
+}
+
+/// Averages groups of rows that lie within 1 ms of the group's first.
+fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
+    let mut merged = Vec::with_capacity(rows.len());
+    let mut start = 0;
+    while start < rows.len() {
+        let since_start_ns = |row: &Row| i128::from(row.t_ns) - i128::from(rows[start].t_ns);
+        let end = start + rows[start..].iter().take_while(|row| since_start_ns(row) < MERGE_NS).count();
+        let group = &rows[start..end];
+        for pair in group.windows(2) {
+            let finding = if pair[0].t_ns == pair[1].t_ns { &mut report.duplicates } else { &mut report.merged };
+            finding.add(pair[1].line);
+        }
+        let count = group.len();
+        let offset_ns = group.iter().map(since_start_ns).sum::<i128>() / count as i128;
+        merged.push(Row {
+            line: group[0].line,
+            // Below 1 ms by construction.
+            t_ns: group[0].t_ns.saturating_add(offset_ns as i64),
+            position_ned_m: group.iter().map(|row| row.position_ned_m).sum::<DVec3>() / count as f64,
+            attitude: Attitude::mean(group.iter().map(|row| row.attitude)),
+        });
+        start = end;
+    }
+    *rows = merged;
+}
+
+/// Interpolates missing attitudes between the known ones around them; holds the nearest one at the ends.
+fn fill_attitudes(rows: &mut [Row]) {
+    let known: Vec<usize> = (0..rows.len()).filter(|&i| !rows[i].attitude.is_missing()).collect();
+    let mut next = 0;
+    for i in 0..rows.len() {
+        if next < known.len() && known[next] == i {
+            next += 1;
+            continue;
+        }
+        let before = next.checked_sub(1).map(|k| rows[known[k]]);
+        let after = known.get(next).map(|&k| rows[k]);
+        rows[i].attitude = match (before, after) {
+            (Some(a), Some(b)) => {
+                let span_s = seconds_between(a.t_ns, b.t_ns);
+                a.attitude.interpolate(b.attitude, seconds_between(a.t_ns, rows[i].t_ns) / span_s)
+            }
+            (Some(one), None) | (None, Some(one)) => one.attitude,
+            (None, None) => Attitude::Missing,
+        };
+    }
+}
+
+fn count_gaps(rows: &[Row], report: &mut CleaningReport) {
+    for pair in rows.windows(2) {
+        let step_s = seconds_between(pair[0].t_ns, pair[1].t_ns);
+        report.longest_step_s = report.longest_step_s.max(step_s);
+        if step_s > GAP_S {
+            report.gaps.add(pair[1].line);
+        }
+    }
+}
+
+/// Puts rows between rows whose three angles change by more than 90 degrees together, so that slerp between rows keeps the turns.
+fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, LogError> {
+    let mut filled = vec![rows[0]];
+    for pair in rows.windows(2) {
+        let (a, b) = (pair[0], pair[1]);
+        if let (Attitude::Turns(from), Attitude::Turns(to)) = (a.attitude, b.attitude) {
+            let degrees: f64 = (0..3).map(|axis| (to[axis] - from[axis]).abs()).sum();
+            let pieces = (degrees / 90.0).ceil().max(1.0);
+            if pieces > MAX_PIECES {
+                return Err(LogError::TurnTooLarge { line: b.line, degrees });
+            }
+            let span_ns = (i128::from(b.t_ns) - i128::from(a.t_ns)) as f64;
+            for piece in 1..pieces as usize {
+                let fraction = piece as f64 / pieces;
+                let t_ns = i128::from(a.t_ns) + (span_ns * fraction) as i128;
+                filled.push(Row {
+                    line: a.line,
+                    t_ns: t_ns as i64,
+                    position_ned_m: a.position_ned_m.lerp(b.position_ned_m, fraction),
+                    attitude: a.attitude.interpolate(b.attitude, fraction),
+                });
+                report.inserted += 1;
+            }
+        }
+        filled.push(b);
+    }
+    Ok(filled)
+}
+
+fn times_s(rows: &[Row]) -> Vec<f64> {
+    rows.iter().map(|row| seconds_between(rows[0].t_ns, row.t_ns)).collect()
+}
+
+/// Through i128: the difference of two i64 may not fit.
+fn seconds_between(from_ns: i64, to_ns: i64) -> f64 {
+    (i128::from(to_ns) - i128::from(from_ns)) as f64 * 1e-9
+}

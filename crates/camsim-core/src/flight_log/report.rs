@@ -1,0 +1,90 @@
+//! What cleaning a log found and did.
+
+use std::fmt;
+
+use crate::scenario::AngleKind;
+
+/// How many line numbers a [`Finding`] keeps.
+pub const KEPT_LINES: usize = 8;
+
+/// One kind of fault: how often, and where it was seen first.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Finding {
+    /// Rows concerned.
+    pub count: usize,
+    /// File lines of the first few.
+    pub lines: Vec<usize>,
+}
+
+impl Finding {
+    pub(super) fn add(&mut self, line: usize) {
+        self.count += 1;
+        if self.lines.len() < KEPT_LINES {
+            self.lines.push(line);
+        }
+    }
+}
+
+/// Every repair, counted, with the lines of the first few.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CleaningReport {
+    /// Rows of the file.
+    pub rows_read: usize,
+    /// Dropped: time or position missing, not finite or out of range.
+    pub unusable: Finding,
+    /// Earlier than a row before them: sorted.
+    pub out_of_order: Finding,
+    /// Attitude missing or not finite: interpolated.
+    pub attitude_missing: Finding,
+    /// Attitude far from both neighbours, which agree with each other: interpolated.
+    pub attitude_glitches: Finding,
+    /// Position far from both neighbours, which agree with each other: dropped.
+    pub position_spikes: Finding,
+    /// Averaged with a row less than 1 ms before, at another time.
+    pub merged: Finding,
+    /// Averaged with a row of the same time.
+    pub duplicates: Finding,
+    /// Later than the row before by more than 1 s of the log's clock.
+    pub gaps: Finding,
+    /// The longest step between two rows, seconds of the log's clock.
+    pub longest_step_s: f64,
+    /// Rows put in between because angles turn by more than 90 degrees.
+    pub inserted: usize,
+    /// How angles were read: `Wrapped` or `Continuous`, never `Auto`.
+    pub angles: AngleKind,
+}
+
+impl CleaningReport {
+    /// Whether nothing had to be repaired (gaps are not repaired, only counted).
+    pub fn is_clean(&self) -> bool {
+        self.findings().iter().all(|(_, finding)| finding.count == 0)
+    }
+
+    fn findings(&self) -> [(&'static str, &Finding); 7] {
+        [
+            ("rows without usable time or position dropped", &self.unusable),
+            ("rows out of order sorted", &self.out_of_order),
+            ("missing attitudes interpolated", &self.attitude_missing),
+            ("attitude glitches interpolated", &self.attitude_glitches),
+            ("position spikes dropped", &self.position_spikes),
+            ("rows less than 1 ms apart averaged", &self.merged),
+            ("rows of equal time averaged", &self.duplicates),
+        ]
+    }
+}
+
+impl fmt::Display for CleaningReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} rows read", self.rows_read)?;
+        let gaps = ("gaps of more than 1 s", &self.gaps);
+        for (what, finding) in self.findings().into_iter().chain([gaps]).filter(|(_, finding)| finding.count > 0) {
+            let lines: Vec<String> = finding.lines.iter().map(usize::to_string).collect();
+            let more = if finding.count > finding.lines.len() { ", ..." } else { "" };
+            write!(f, "; {} {what} (line {}{more})", finding.count, lines.join(", "))?;
+        }
+        if self.inserted > 0 {
+            write!(f, "; {} rows inserted where angles turn by more than 90 degrees", self.inserted)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,236 @@
+#![allow(clippy::unwrap_used)]
+
+use camsim_core::{
+    flight_log::{RawAttitude, RawPosition, body_from_euler_deg},
+    scenario::{AngleKind, AttitudeSource, HeightReference, Origin},
+};
+use glam::{DQuat, DVec3};
+
+use super::*;
+
+fn spec(format: LogFormat) -> FlightSpec {
+    FlightSpec {
+        log: PathBuf::new(),
+        format,
+        angles: AngleKind::Auto,
+        attitude: AttitudeSource::Log,
+        origin: Origin::First,
+        height: HeightReference::Ellipsoid,
+        window_s: None,
+        speed: 1.0,
+    }
+}
+
+fn raw(content: &str, format: LogFormat) -> Result<Vec<RawRow>, FlightLogError> {
+    raw_bytes(content.as_bytes(), format)
+}
+
+fn raw_bytes(content: &[u8], format: LogFormat) -> Result<Vec<RawRow>, FlightLogError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, content).unwrap();
+    read_raw_rows(&path, format)
+}
+
+fn ned(row: &RawRow) -> DVec3 {
+    match row.position {
+        RawPosition::Ned(ned) => ned,
+        RawPosition::Geodetic(at) => panic!("{at:?} is geodetic"),
+    }
+}
+
+const LLA: &str = "0.000,47.0,8.0,500,1,2,3\n0.5,47.0001,8.0,501,1,2,3\n1.0,47.0002,8.0,502,1,2,3\n";
+
+#[test]
+fn separators_bom_crlf_and_comments_make_no_difference() {
+    let plain = raw(LLA, LogFormat::Auto).unwrap();
+    assert_eq!(plain.len(), 3);
+    assert_eq!(plain[1].t_ns, Some(500_000_000));
+    assert_eq!(plain[1].attitude, RawAttitude::EulerDeg([1.0, 2.0, 3.0]));
+    for variant in [
+        format!("\u{feff}{}", LLA.replace('\n', "\r\n")),
+        LLA.replace(',', " ; "),
+        LLA.replace(',', "\t "),
+        LLA.replace('\n', ",\n"),
+        LLA.trim_end().to_owned(),
+    ] {
+        assert_eq!(raw(&variant, LogFormat::Auto).unwrap(), plain, "{variant:?}");
+    }
+    let commented = raw(&format!("# a flight\n% of mine\n\n{LLA}# the end\n"), LogFormat::Auto).unwrap();
+    assert_eq!(commented.iter().map(|row| row.line).collect::<Vec<_>>(), [4, 5, 6]);
+}
+
+#[test]
+fn headers_name_columns_in_any_order() {
+    let rows = raw(
+        "yaw_rad,Latitude,lon [deg],note,alt_m,pitch,roll,timestamp [us]\n1.5707963267948966,47,8,hello,500,2,1,1500000\n",
+        LogFormat::Auto,
+    )
+    .unwrap();
+    assert_eq!(rows[0].t_ns, Some(1_500_000_000));
+    assert!(matches!(rows[0].position, RawPosition::Geodetic(at) if (at.lon_deg() - 8.0).abs() < 1e-12));
+    assert_eq!(rows[0].attitude, RawAttitude::EulerDeg([1.0, 2.0, 90.0]));
+    let down = raw("t,east,north,down,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n", LogFormat::Auto).unwrap();
+    assert_eq!(ned(&down[0]), DVec3::new(2.0, 1.0, 3.0));
+    assert_eq!(down[0].attitude, RawAttitude::Quaternion(DQuat::IDENTITY));
+    let up = raw("# t north east alt roll pitch yaw\n0 1 2 3 0 0 0\n", LogFormat::Auto).unwrap();
+    assert_eq!(ned(&up[0]), DVec3::new(1.0, 2.0, -3.0));
+    let xyz = "t,x,y,z,roll,pitch,yaw\n0,1,2,3,0,0,0\n";
+    assert!(raw(xyz, LogFormat::Auto).unwrap_err().to_string().contains("csv-ned"));
+    assert_eq!(ned(&raw(xyz, LogFormat::CsvNed).unwrap()[0]), DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(ned(&raw(xyz, LogFormat::CsvXya).unwrap()[0]), DVec3::new(1.0, 2.0, -3.0));
+    assert!(raw(xyz, LogFormat::CsvLla).is_err());
+    assert!(raw("t,lat,lon,alt\n0,1,2,3\n", LogFormat::CsvNed).unwrap_err().to_string().contains("flight.format"));
+    assert!(raw("foo,bar\n1,2\n", LogFormat::Auto).unwrap_err().to_string().contains("line 1"));
+}
+
+#[test]
+fn auto_refuses_what_fits_two_layouts() {
+    let metres = "0,-299.1,-54.3,-3346.5,9.7,1.7,94.0\n1,-323.7,-87.0,-3303.1,11.6,0.9,106.6\n";
+    let slow = "0,1,2,3,0,0,0\n1,1.5,2,3,0,0,0\n";
+    let one_row = "0,47,8,500,0,0,0\n";
+    let still = "0,47,8,500,0,0,0\n1,47,8,500,0,0,0\n";
+    let quaternion = "0,1,2,3,0,0,0,1\n1,1,2,3,0,0,0,1\n";
+    for content in [metres, slow, one_row, still, quaternion] {
+        let error = raw(content, LogFormat::Auto).unwrap_err();
+        assert!(matches!(error, FlightLogError::Ambiguous { .. }), "{content}: {error}");
+        assert!(error.to_string().contains("flight.format"), "{error}");
+    }
+    assert!(matches!(raw("0,1,2,3,4\n", LogFormat::Auto), Err(FlightLogError::UnknownLayout { columns: 5, .. })));
+    assert_eq!(raw(one_row, LogFormat::CsvLla).unwrap().len(), 1);
+}
+
+#[test]
+fn tum_and_euroc_become_ned_and_frd() {
+    // 1 m east, 2 m north, 3 m up; a forward-left-up body turned 90 degrees to the left of east looks north.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let tum = raw(&format!("1520531829.301144123 1 2 3 0 0 {half} {half}\n"), LogFormat::Auto).unwrap();
+    let euroc = raw(
+        &format!("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z [],v [m s^-1]\n1520531829301144123,1,2,3,{half},0,0,{half},9\n"),
+        LogFormat::Euroc,
+    )
+    .unwrap();
+    let headerless = raw(&format!("1520531829301144123,1,2,3,{half},0,0,{half}\n"), LogFormat::Auto).unwrap();
+    for row in [tum[0], euroc[0], headerless[0]] {
+        // Nanoseconds survive: an f64 of these seconds would be off by up to 120 ns.
+        assert_eq!(row.t_ns, Some(1_520_531_829_301_144_123));
+        assert_eq!(ned(&row), DVec3::new(2.0, 1.0, -3.0));
+        let RawAttitude::Quaternion(ned_from_body) = row.attitude else { panic!("{row:?}") };
+        assert!(ned_from_body.dot(DQuat::IDENTITY).abs() > 1.0 - 1e-15, "{ned_from_body}");
+    }
+    // Level and looking east: yaw 90 degrees; nose up in FLU is a negative turn about left.
+    let up = DQuat::from_rotation_y(-0.1);
+    let row = raw(&format!("0 0 0 0 {} {} {} {}\n", up.x, up.y, up.z, up.w), LogFormat::Tum).unwrap()[0];
+    let RawAttitude::Quaternion(ned_from_body) = row.attitude else { panic!("{row:?}") };
+    assert!(ned_from_body.dot(body_from_euler_deg([0.0, 0.1_f64.to_degrees(), 90.0])).abs() > 1.0 - 1e-14);
+}
+
+#[test]
+fn bad_files_get_one_clear_error() {
+    let text = |result: Result<Vec<RawRow>, FlightLogError>| result.unwrap_err().to_string();
+    assert!(matches!(raw("", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
+    assert!(matches!(raw("# only words\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
+    assert!(matches!(raw("t,lat,lon,alt\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
+    assert!(matches!(raw_bytes(b"0,1\xff,2", LogFormat::Auto), Err(FlightLogError::NotText { offset: 3, .. })));
+    let error = text(raw(&LLA.replace("501", "5o1"), LogFormat::Auto));
+    assert!(error.contains("line 2, column 4: `5o1` is not a number"), "{error}");
+    let error = text(raw(&format!("{LLA}1.5,47.0,8.0\n"), LogFormat::Auto));
+    assert!(error.contains("line 4 has 3 columns, csv-lla needs 7"), "{error}");
+    let error = text(raw("0,91,8,500,0,0,0\n", LogFormat::CsvLla));
+    assert!(error.contains("line 1, column 2: 91 is no latitude"), "{error}");
+    assert!(text(raw("1 0 0 5 0 1 0 6 0 0 1 7\n", LogFormat::Tum)).contains("KITTI"));
+    let missing = read_raw_rows(Path::new("/nowhere/at/all.csv"), LogFormat::Auto);
+    assert!(text(missing).contains("/nowhere/at/all.csv"));
+}
+
+#[test]
+fn missing_values_are_left_to_cleaning() {
+    let rows = raw("0,47,8,500,1,2,3\n,47,8,500,1,2,3\n1,nan,8,500,1,,3\n1e30,47,8,inf,1,2,3\n", LogFormat::CsvLla).unwrap();
+    assert_eq!(rows[1].t_ns, None);
+    assert_eq!(rows[3].t_ns, None);
+    assert!(matches!(rows[2].attitude, RawAttitude::EulerDeg([_, pitch, _]) if pitch.is_nan()));
+}
+
+#[test]
+fn times_are_exact_decimals() {
+    use text::{TimeUnit, time_ns};
+    assert_eq!(time_ns("-1.5", TimeUnit::Seconds), Some(Some(-1_500_000_000)));
+    assert_eq!(time_ns("+.25", TimeUnit::Milliseconds), Some(Some(250_000)));
+    assert_eq!(time_ns("1.0000000006", TimeUnit::Seconds), Some(Some(1_000_000_001)));
+    assert_eq!(time_ns("1.037359e-01", TimeUnit::Seconds), Some(Some(103_735_900)));
+    assert_eq!(time_ns("9223372036854775807", TimeUnit::Nanoseconds), Some(Some(i64::MAX)));
+    assert_eq!(time_ns("9223372036854775808", TimeUnit::Nanoseconds), Some(None));
+    assert_eq!(time_ns("nan", TimeUnit::Seconds), Some(None));
+    assert_eq!(time_ns("1:30", TimeUnit::Seconds), None);
+}
+
+/// The collected real flights: what each gives, and that only the faults that are there are found.
+#[test]
+fn real_flights() {
+    let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
+        eprintln!("CAMSIM_DATA is not set: skipped");
+        return;
+    };
+    let read = |file: &str, format, attitude| {
+        let start = std::time::Instant::now();
+        let result = read_flight_log(&data.join(file), &FlightSpec { attitude, ..spec(format) }, HeightConversion::None);
+        match &result {
+            Ok(log) => eprintln!(
+                "{file}: {} rows, {:.1} s, {:.2} m/s, {:.1} deg/s, {:.0} ms; {}",
+                log.rows.len(),
+                log.duration_s(),
+                log.speed_percentile_m_s(0.999),
+                log.angular_rate_percentile_rad_s(0.999).to_degrees(),
+                start.elapsed().as_secs_f64() * 1e3,
+                log.report
+            ),
+            Err(error) => eprintln!("{error}"),
+        }
+        result
+    };
+    let log = |file: &str| read(file, LogFormat::Auto, AttitudeSource::Log).unwrap();
+
+    let start = std::time::Instant::now();
+    let lawnmower = log("camsim/path_lawnmower.csv");
+    assert!(start.elapsed().as_secs_f64() < 0.5, "reading took {:?}", start.elapsed());
+    // NUMERICS.md names 44849 for the last one; the file's odd row is the one before: -170.4 between 179.8 and -180.0.
+    assert_eq!(lawnmower.report.attitude_glitches.lines, [7190, 22762, 23060, 37732, 44551, 44848]);
+    assert_eq!(lawnmower.report.position_spikes.count, 0);
+    assert_eq!(lawnmower.report.rows_read, 51_753);
+    let speed = lawnmower.speed_percentile_m_s(0.999);
+    assert!((10.0..25.0).contains(&speed), "{speed}");
+
+    for (file, rows) in [
+        ("flights/demo_brighton_lawnmower_x0.05.csv", 5886),
+        ("flights/demo_sertig_lawnmower_x5.5.csv", 10_618),
+        ("flights/glider_9crx3101_camsim_derived.csv", 2133),
+        ("flights/euroc_V1_03_difficult.txt", 20_932),
+        ("flights/tumvi_corridor1_okvis.txt", 5986),
+        ("flights/tumrgbd_fr2_desk_groundtruth.txt", 20_957),
+        ("flights/rpng_neighborhood_01_gps.txt", 1931),
+    ] {
+        let report = log(file).report;
+        assert_eq!(report.rows_read, rows, "{file}");
+        assert_eq!((report.attitude_glitches.count, report.position_spikes.count), (0, 0), "{file}: {report}");
+    }
+    let desk = log("flights/tumrgbd_fr2_desk_groundtruth.txt").report;
+    assert_eq!((desk.gaps.count, desk.duplicates.count), (5, 1));
+    assert!((desk.longest_step_s - 12.0).abs() < 0.1, "{}", desk.longest_step_s);
+    assert!(read("flights/glider_9crx3101.csv", LogFormat::Auto, AttitudeSource::Log).unwrap_err().to_string().contains("track"));
+    read("flights/glider_9crx3101.csv", LogFormat::Auto, AttitudeSource::Track).unwrap();
+    read("flights/rpng_neighborhood_01_gps.txt", LogFormat::Auto, AttitudeSource::Track).unwrap();
+    assert!(matches!(read("flights/kitti_00_gt.txt", LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::PoseMatrices { .. })));
+    assert!(read("flights/kitti_00_gt_times.txt", LogFormat::Auto, AttitudeSource::Log).is_err());
+
+    for (file, rows) in [
+        ("camsim/path-pure-pattern-rotation.csv", 5),
+        ("camsim/path-pure-pattern-translation.csv", 2),
+        ("camsim/path-chessboard-S3fisheye-lowoffset-opencv+posetracker.csv", 60),
+        ("camsim/path-chessboard-S3fisheye-lowoffset-agisoftlens+posetracker.csv", 60),
+    ] {
+        assert!(matches!(read(file, LogFormat::Auto, AttitudeSource::Log), Err(FlightLogError::Ambiguous { .. })), "{file}");
+        let log = read(file, LogFormat::CsvNed, AttitudeSource::Log).unwrap();
+        assert_eq!(log.rows.len(), rows, "{file}");
+        assert!(log.report.is_clean(), "{file}: {}", log.report);
+    }
+}
