@@ -5,8 +5,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::write::write_atomically;
-
 macro_rules! embedded {
     ($($name:literal),* $(,)?) => {
         const FILES: &[(&str, &[u8])] = &[$(($name, include_bytes!(concat!("../../../assets/", $name)))),*];
@@ -36,7 +34,9 @@ pub fn unpack(folder: &Path) -> io::Result<PathBuf> {
         if std::fs::read(&path).is_ok_and(|there| there == *bytes) {
             continue;
         }
-        write_atomically(&path, bytes)?;
+        let partial = folder.join(format!(".{name}.partial"));
+        std::fs::write(&partial, bytes)?;
+        std::fs::rename(&partial, &path)?;
     }
     Ok(folder.join("demo.toml"))
 }
