@@ -21,3 +21,5 @@ pub mod builtin;
 pub mod write;
 
 pub mod manifest;
+
+pub mod compare;

@@ -1,0 +1,281 @@
+//! Two pictures or two folders of pictures, compared (`camsim compare`).
+//!
+//! Values are compared as stored, a code range being 0..=1: so EXR with EXR (linear) and PNG with PNG (as encoded), never one with the other.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+};
+
+use camsim_core::metrics::{self, Comparison, ImageView, MetricError};
+use exr::prelude::read_first_flat_layer_from_file;
+use serde::Serialize;
+use thiserror::Error;
+
+/// Why two things cannot be compared.
+#[derive(Debug, Error)]
+pub enum CompareError {
+    /// A file or folder cannot be read.
+    #[error("cannot read {}: {message}; give two EXR or PNG pictures, or two folders of them", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Reason.
+        message: String,
+    },
+    /// EXR against PNG, a file against a folder, other channels.
+    #[error("{} and {} do not compare: {message}", a.display(), b.display())]
+    Kind {
+        /// First.
+        a: PathBuf,
+        /// Second.
+        b: PathBuf,
+        /// What differs.
+        message: String,
+    },
+    /// Sizes differ.
+    #[error("{} and {}: {source}", a.display(), b.display())]
+    Metric {
+        /// First.
+        a: PathBuf,
+        /// Second.
+        b: PathBuf,
+        /// Reason.
+        source: MetricError,
+    },
+    /// Two folders without a picture of one name.
+    #[error("{} and {} have no EXR or PNG of the same name; compare two output folders of one scenario", a.display(), b.display())]
+    NothingInCommon {
+        /// First.
+        a: PathBuf,
+        /// Second.
+        b: PathBuf,
+    },
+}
+
+/// The figures of one comparison, as `camsim compare --json` prints them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Figures {
+    /// Root mean square difference.
+    pub rmse: f64,
+    /// Largest absolute difference.
+    pub max: f64,
+    /// Peak signal-to-noise ratio for a peak of 1; null for equal pictures.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity; null below 11 pixels of width or height.
+    pub ssim: Option<f64>,
+    /// Share of pixels that differ at all.
+    pub differing: f64,
+    /// Pixels with a NaN or an infinity in either picture, left out of the first four.
+    pub non_finite: u64,
+}
+
+impl From<&Comparison> for Figures {
+    fn from(c: &Comparison) -> Self {
+        let psnr_db = Some(c.psnr_db()).filter(|psnr| psnr.is_finite());
+        Self { rmse: c.rmse, max: c.max, psnr_db, ssim: c.ssim, differing: c.differing, non_finite: c.non_finite }
+    }
+}
+
+/// One file of two folders.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FileFigures {
+    /// Path below both folders.
+    pub file: String,
+    /// Its figures.
+    #[serde(flatten)]
+    pub figures: Figures,
+}
+
+/// What `camsim compare` tells: the figures of all files as one, then file by file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// All files as one: pooled RMSE, largest maximum, mean SSIM.
+    #[serde(flatten)]
+    pub total: Figures,
+    /// File by file; empty for two single files.
+    pub files: Vec<FileFigures>,
+    /// Pictures that only the first folder has.
+    pub only_in_a: Vec<String>,
+    /// Pictures that only the second folder has.
+    pub only_in_b: Vec<String>,
+}
+
+/// Compares two pictures, or all pictures of the same name below two folders.
+///
+/// # Errors
+/// Something cannot be read, or two pictures differ in kind, channels or size.
+pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
+    match (a.is_dir(), b.is_dir()) {
+        (false, false) => {
+            let total = Figures::from(&compare_files(a, b)?);
+            Ok(Report { total, files: vec![], only_in_a: vec![], only_in_b: vec![] })
+        }
+        (true, true) => compare_folders(a, b),
+        _ => Err(CompareError::Kind { a: a.into(), b: b.into(), message: "one is a folder; give two files or two folders".into() }),
+    }
+}
+
+fn compare_folders(a: &Path, b: &Path) -> Result<Report, CompareError> {
+    let (mut in_a, mut in_b) = (BTreeSet::new(), BTreeSet::new());
+    pictures_below(a, "", &mut in_a)?;
+    pictures_below(b, "", &mut in_b)?;
+    let (mut files, mut all) = (Vec::new(), Vec::new());
+    for name in in_a.intersection(&in_b) {
+        let comparison = compare_files(&a.join(name), &b.join(name))?;
+        files.push(FileFigures { file: name.clone(), figures: (&comparison).into() });
+        all.push(comparison);
+    }
+    let total = Comparison::pooled(&all).ok_or_else(|| CompareError::NothingInCommon { a: a.into(), b: b.into() })?;
+    let only = |one: &BTreeSet<String>, other: &BTreeSet<String>| one.difference(other).cloned().collect();
+    Ok(Report { total: (&total).into(), files, only_in_a: only(&in_a, &in_b), only_in_b: only(&in_b, &in_a) })
+}
+
+fn pictures_below(root: &Path, below: &str, names: &mut BTreeSet<String>) -> Result<(), CompareError> {
+    let folder = root.join(below);
+    let fail = |error: std::io::Error| CompareError::Read { path: folder.clone(), message: error.to_string() };
+    for entry in fs::read_dir(&folder).map_err(fail)? {
+        let entry = entry.map_err(fail)?;
+        let file = entry.file_name().to_string_lossy().into_owned();
+        let name = if below.is_empty() { file } else { format!("{below}/{file}") };
+        // The entry's own type: a link that leads back up would never end.
+        if entry.file_type().map_err(fail)?.is_dir() {
+            pictures_below(root, &name, names)?;
+        } else if kind(Path::new(&name)).is_some() {
+            names.insert(name);
+        }
+    }
+    Ok(())
+}
+
+fn kind(path: &Path) -> Option<&'static str> {
+    let extension = path.extension()?.to_str()?;
+    ["exr", "png"].into_iter().find(|kind| extension.eq_ignore_ascii_case(kind))
+}
+
+struct Picture {
+    size_px: [u32; 2],
+    channels: Vec<String>,
+    samples: Vec<f32>,
+}
+
+impl Picture {
+    fn view(&self, alpha: Option<usize>) -> ImageView<'_> {
+        ImageView { size_px: self.size_px, channels: self.channels.len(), alpha, samples: &self.samples }
+    }
+}
+
+fn compare_files(a: &Path, b: &Path) -> Result<Comparison, CompareError> {
+    let differ = |message: String| CompareError::Kind { a: a.into(), b: b.into(), message };
+    let (one, other) = (read(a)?, read(b)?);
+    if kind(a) != kind(b) {
+        return Err(differ("one is linear EXR, the other encoded PNG; compare files of one format".into()));
+    }
+    if one.channels != other.channels {
+        return Err(differ(format!("channels {} against {}", one.channels.join(" "), other.channels.join(" "))));
+    }
+    let alpha = one.channels.iter().position(|name| name == "A");
+    metrics::compare(one.view(alpha), other.view(alpha)).map_err(|source| CompareError::Metric { a: a.into(), b: b.into(), source })
+}
+
+fn read(path: &Path) -> Result<Picture, CompareError> {
+    let fail = |message: String| CompareError::Read { path: path.into(), message };
+    match kind(path) {
+        Some("exr") => read_exr(path).map_err(fail),
+        Some(_) => read_png(path).map_err(fail),
+        None if path.exists() => Err(fail("it is neither .exr nor .png".into())),
+        None => Err(fail("there is no such file".into())),
+    }
+}
+
+/// Channels in the order R G B A, others after them by name: luminance needs the first three.
+fn read_exr(path: &Path) -> Result<Picture, String> {
+    let layer = read_first_flat_layer_from_file(path).map_err(|error| error.to_string())?.layer_data;
+    let mut planes: Vec<(String, Vec<f32>)> =
+        layer.channel_data.list.iter().map(|c| (c.name.to_string(), c.sample_data.values_as_f32().collect())).collect();
+    planes.sort_by_key(|(name, _)| (["R", "G", "B", "A"].iter().position(|n| n == name).unwrap_or(4), name.clone()));
+    let pixels = layer.size.0 * layer.size.1;
+    if planes.iter().any(|(_, plane)| plane.len() != pixels) {
+        return Err("it has subsampled channels".into());
+    }
+    let samples = (0..pixels).flat_map(|pixel| planes.iter().map(move |(_, plane)| plane[pixel])).collect();
+    let channels = planes.iter().map(|(name, _)| name.clone()).collect();
+    Ok(Picture { size_px: [layer.size.0 as u32, layer.size.1 as u32], channels, samples })
+}
+
+fn read_png(path: &Path) -> Result<Picture, String> {
+    let image = image::open(path).map_err(|error| error.to_string())?;
+    let size_px = [image.width(), image.height()];
+    let names: &[&str] = match image.color().channel_count() {
+        1 => &["L"],
+        2 => &["L", "A"],
+        3 => &["R", "G", "B"],
+        _ => &["R", "G", "B", "A"],
+    };
+    let samples = match names.len() {
+        1 => image.to_luma32f().into_raw(),
+        2 => image.to_luma_alpha32f().into_raw(),
+        3 => image.to_rgb32f().into_raw(),
+        _ => image.to_rgba32f().into_raw(),
+    };
+    Ok(Picture { size_px, channels: names.iter().map(|&name| name.into()).collect(), samples })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+    use camsim_core::{
+        frame::RenderedFrame,
+        scenario::{ImageFormat, OutputEncoding, OutputSpec},
+    };
+
+    use super::*;
+    use crate::write::{FrameFiles, FrameWriter};
+
+    fn render(folder: &Path, value: f32, frames: u64, width: u32) {
+        let spec = OutputSpec { format: vec![ImageFormat::Exr, ImageFormat::Png], ..OutputSpec::default() };
+        let writer = FrameWriter::new(FrameFiles::new(folder, &spec, OutputEncoding::Linear8), 1);
+        for index in 0..frames {
+            let color_rgba = (0..width * 12).flat_map(|_| [value, value, value, 1.0]).collect();
+            writer.write(RenderedFrame { index, size_px: [width, 12], color_rgba, ..RenderedFrame::default() }).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+
+    #[test]
+    fn folders_files_and_what_does_not_fit() {
+        let dir = tempfile::tempdir().unwrap();
+        let [a, b, c] = ["a", "b", "c"].map(|name| dir.path().join(name));
+        render(&a, 0.5, 3, 16);
+        render(&b, 0.25, 2, 16);
+        render(&c, 0.5, 1, 17);
+
+        let equal = compare_paths(&a, &a).unwrap();
+        assert_eq!((equal.total.rmse, equal.total.psnr_db, equal.total.differing, equal.files.len()), (0.0, None, 0.0, 6));
+        let json: serde_json::Value = serde_json::to_value(&equal).unwrap();
+        for key in ["rmse", "max", "psnr_db", "ssim", "differing"] {
+            assert!(json.get(key).is_some(), "{key}");
+        }
+
+        let report = compare_paths(&a, &b).unwrap();
+        assert_eq!((report.files.len(), report.only_in_a.len(), report.only_in_b.len()), (4, 2, 0));
+        assert_eq!((report.files[0].file.as_str(), report.files[0].figures.rmse), ("color/frame_000000.exr", 0.25));
+        assert_eq!(report.total.differing, 1.0);
+
+        let (exr, png) = ("color/frame_000000.exr", "color/frame_000000.png");
+        assert_eq!(compare_paths(&a.join(exr), &b.join(exr)).unwrap().total.max, 0.25);
+        for (one, other, expected) in [
+            (a.join(exr), a.join(png), "compare files of one format"),
+            (a.join(exr), c.join(exr), "16x12 against 17x12"),
+            (a.clone(), a.join(exr), "one is a folder"),
+            (a.join("no.png"), a.join(png), "cannot read"),
+            (a.join("color"), c.clone(), "no EXR or PNG of the same name"),
+        ] {
+            let error = compare_paths(&one, &other).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+        fs::write(a.join("broken.exr"), b"not an exr").unwrap();
+        assert!(compare_paths(&a.join("broken.exr"), &a.join(exr)).unwrap_err().to_string().contains("broken.exr"));
+    }
+}

@@ -1,0 +1,171 @@
+//! Every key of a scenario file, with what it takes. A test holds this table against the structs.
+
+/// What a key takes.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind {
+    /// A number.
+    Number,
+    /// A number, or one of these words.
+    NumberOr(&'static [&'static str]),
+    /// A whole number from 0.
+    Whole,
+    /// A whole number, or one of these words.
+    WholeOr(&'static [&'static str]),
+    /// That many numbers.
+    Numbers(usize),
+    /// That many numbers, or this word.
+    NumbersOr(usize, &'static str),
+    /// That many whole numbers.
+    Wholes(usize),
+    /// Any number of numbers.
+    NumberList,
+    /// A path, resolved against the folder of the file that names it.
+    Path,
+    /// One of these words.
+    Word(&'static [&'static str]),
+    /// A list of these words.
+    Words(&'static [&'static str]),
+    /// An array of tables, whose keys stand under the same dotted name.
+    Tables,
+    /// Planned, but not in this version.
+    Later,
+}
+
+use Kind::*;
+
+const AUTO: &[&str] = &["auto"];
+const HEIGHT: &[&str] = &["ellipsoid", "msl"];
+
+/// Dotted keys; elements of an array of tables stand without their index.
+pub(super) const KEYS: &[(&str, Kind)] = &[
+    ("seed", Whole),
+    ("flight.log", Path),
+    ("flight.format", Word(&["auto", "csv-lla", "csv-xya", "csv-ned", "tum", "euroc"])),
+    ("flight.angles", Word(&["auto", "wrapped", "continuous"])),
+    ("flight.attitude", Word(&["log", "track"])),
+    ("flight.origin", NumbersOr(3, "first")),
+    ("flight.height", Word(HEIGHT)),
+    ("flight.window_s", Numbers(2)),
+    ("flight.speed", Number),
+    ("tracker.kind", Word(&["hold", "linear", "sqrt", "spline"])),
+    ("tracker.rate_hz", Number),
+    ("tracker.max_speed_m_s", NumberOr(AUTO)),
+    ("tracker.max_acceleration_m_s2", Number),
+    ("tracker.max_angular_rate_deg_s", NumberOr(AUTO)),
+    ("tracker.max_angular_acceleration_deg_s2", Number),
+    ("camera.size_px", Wholes(2)),
+    ("camera.focal_px", Numbers(2)),
+    ("camera.principal_point_px", Numbers(2)),
+    ("camera.fps", Number),
+    ("camera.phase", Number),
+    ("camera.mount.angles_deg", Numbers(3)),
+    ("camera.mount.offset_m", Numbers(3)),
+    ("camera.mount.vibration", Tables),
+    ("camera.mount.vibration.axis", Word(&["roll", "pitch", "yaw", "x", "y", "z"])),
+    ("camera.mount.vibration.amplitude_deg", Number),
+    ("camera.mount.vibration.amplitude_m", Number),
+    ("camera.mount.vibration.hz", Number),
+    ("camera.mount.vibration.phase_deg", Number),
+    ("camera.lens.model", Word(&["pinhole", "brown-conrady", "kannala-brandt"])),
+    ("camera.lens.coefficients", NumberList),
+    ("camera.zoom", Tables),
+    ("camera.zoom.at", Number),
+    ("camera.zoom.focal_px", Numbers(2)),
+    ("camera.zoom.principal_point_px", Numbers(2)),
+    ("camera.zoom.coefficients", NumberList),
+    ("camera.zoom_track", Path),
+    ("camera.shutter.delay_ms", Number),
+    ("camera.shutter.readout_ms", Number),
+    ("camera.shutter.readout", Word(&["top-to-bottom", "bottom-to-top", "left-to-right", "right-to-left"])),
+    ("camera.shutter.exposure_ms", Number),
+    ("camera.shutter.interlace_ms", NumberOr(&["field"])),
+    ("camera.shutter.first_field", Word(&["even", "odd"])),
+    ("camera.photometric.vignette", Path),
+    ("camera.photometric.vignette_thresholds", Numbers(2)),
+    ("camera.photometric.light", Number),
+    ("camera.photometric.noise_sigma", Number),
+    ("camera.photometric.output", Word(&["linear-f32", "linear-f16", "srgb8", "linear8", "luma8", "luma16"])),
+    ("camera.sensor", Later),
+    ("scene.terrain.dem", Path),
+    ("scene.terrain.ortho", Path),
+    ("scene.terrain.height", Word(HEIGHT)),
+    ("scene.terrain.epsg", Whole),
+    ("scene.pattern.image", Path),
+    ("scene.pattern.width_m", Number),
+    ("scene.pattern.at", NumbersOr(3, "origin")),
+    ("scene.gltf", Later),
+    ("scene.sky", Numbers(3)),
+    ("scene.fog_visibility_m", Number),
+    ("quality.preset", Word(&["default", "paper"])),
+    ("quality.max_error_px", Number),
+    ("quality.max_error_dn", Number),
+    ("quality.max_terrain_error_px", Number),
+    ("quality.solver", Word(&["auto", "reproject"])),
+    ("quality.blur_samples", WholeOr(AUTO)),
+    ("quality.footprint_taps", WholeOr(AUTO)),
+    ("quality.key_frames", WholeOr(AUTO)),
+    ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
+    ("output.format", Words(&["exr", "png"])),
+    ("output.exr_pixel", Word(&["half", "float"])),
+    ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
+];
+
+/// Words that the format knows and this version does not.
+pub(super) const LATER_WORDS: &[(&str, &str)] = &[
+    ("quality.solver", "linear"),
+    ("quality.solver", "rk2"),
+    ("quality.solver", "oracle"),
+    ("flight.format", "ulog"),
+    ("flight.format", "gpx"),
+    ("output.channels", "flow"),
+];
+
+/// Keys without which there is nothing to run, under the table that makes them necessary.
+pub(super) const REQUIRED: &[(&str, &str)] = &[
+    ("flight.log", ""),
+    ("scene", ""),
+    ("scene.terrain.dem", "scene.terrain"),
+    ("scene.pattern.image", "scene.pattern"),
+    ("scene.pattern.width_m", "scene.pattern"),
+    ("camera.mount.vibration.axis", "camera.mount.vibration"),
+    ("camera.mount.vibration.hz", "camera.mount.vibration"),
+    ("camera.zoom.at", "camera.zoom"),
+    ("camera.zoom.focal_px", "camera.zoom"),
+];
+
+pub(super) fn kind_of(key: &str) -> Option<Kind> {
+    KEYS.iter().find(|(name, _)| *name == key).map(|(_, kind)| *kind)
+}
+
+/// Whether `key` is a table of the schema (`camera.lens`).
+pub(super) fn is_table(key: &str) -> bool {
+    key.is_empty() || KEYS.iter().any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
+}
+
+/// The known key that is most like `key`: a sibling first, else anywhere (a key in the wrong table).
+pub(super) fn nearest(key: &str) -> Option<String> {
+    let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
+    let mut names: Vec<&str> = Vec::new();
+    for (name, _) in KEYS {
+        names.extend(name.match_indices('.').map(|(at, _)| &name[..at]));
+        names.push(name);
+    }
+    let score = |name: &&str| {
+        let (its_parent, its_leaf) = name.rsplit_once('.').unwrap_or(("", name));
+        let alike = alikeness(leaf, its_leaf);
+        if its_parent == parent { alike + 0.15 } else { alike }
+    };
+    let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    (score(&best) > 0.72).then(|| best.to_owned())
+}
+
+/// The word of `words` that is most like `word`.
+pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
+    let score = |candidate: &&str| alikeness(word, candidate);
+    words.iter().copied().max_by(|a, b| score(a).total_cmp(&score(b))).filter(|best| score(best) > 0.65)
+}
+
+/// 0..=1. Jaro-Winkler likes common beginnings, Damerau-Levenshtein sees swapped letters in short words.
+fn alikeness(a: &str, b: &str) -> f64 {
+    strsim::jaro_winkler(a, b).max(strsim::normalized_damerau_levenshtein(a, b))
+}

@@ -1,0 +1,171 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use camsim_core::scenario::{Auto, CameraSpec, FieldOr, OutputSpec, QualitySpec, Readout, TrackerSpec};
+
+use super::{schema::KEYS, *};
+
+const GOOD: &str = "[flight]\nlog = \"a.csv\"\n[scene.pattern]\nimage = \"g.png\"\nwidth_m = 10\n";
+
+fn parse(text: &str) -> Result<Scenario, ScenarioError> {
+    parse_scenario(text, Path::new("dir/s.toml"), &[])
+}
+
+fn with(sets: &[(&str, &str)]) -> Result<Scenario, ScenarioError> {
+    let sets: Vec<_> = sets.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+    parse_scenario(GOOD, Path::new("dir/s.toml"), &sets)
+}
+
+#[test]
+fn the_printed_default_holds_the_defaults() {
+    let scenario = parse(&print_default()).unwrap();
+    assert_eq!(scenario.seed, 0);
+    assert_eq!(scenario.flight.speed, 1.0);
+    assert_eq!(scenario.tracker, TrackerSpec::default());
+    assert_eq!(scenario.camera, CameraSpec::default());
+    assert_eq!(scenario.quality, QualitySpec::default());
+    assert_eq!(scenario.output, OutputSpec::default());
+}
+
+/// Schema and structs cannot drift apart: every key in the printed default or in its comments, every word deserialises.
+#[test]
+fn every_word_of_the_schema_is_known_to_the_structs() {
+    for (key, kind) in KEYS {
+        if key.starts_with("camera.mount.vibration.") || key.starts_with("camera.zoom.") {
+            continue;
+        }
+        let values: Vec<String> = match kind {
+            schema::Kind::Word(words) | schema::Kind::NumberOr(words) | schema::Kind::WholeOr(words) => {
+                words.iter().map(|w| (*w).into()).collect()
+            }
+            schema::Kind::Words(words) => words.iter().map(|w| format!("[\"{w}\"]")).collect(),
+            schema::Kind::NumbersOr(_, word) => vec![(*word).into(), "[1.0, 2.0, 3.0]".into()],
+            _ => continue,
+        };
+        for value in values {
+            let text = print_default().replace("# pattern", "pattern");
+            let sets = [((*key).to_owned(), value.clone())];
+            match parse_scenario(&text, Path::new("s.toml"), &sets) {
+                Ok(_) => {}
+                Err(error) => assert_eq!(value, "paper", "{key} = {value}: {error}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_key_of_the_structs_is_in_the_schema() {
+    let mut text = print_default();
+    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "fog_visibility_m"] {
+        text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
+    }
+    text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
+    text += "[[camera.mount.vibration]]\naxis = \"roll\"\nhz = 3\n";
+    let mut scenario = parse(&text).unwrap();
+    scenario.scene.terrain.as_mut().unwrap().epsg = Some(32632);
+    let saved = toml::to_string(&scenario).unwrap();
+    assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario, "a saved scenario reads back");
+    let mut seen = Vec::new();
+    collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
+    for (key, kind) in KEYS {
+        let later = matches!(kind, schema::Kind::Later);
+        assert_eq!(seen.iter().any(|s| s == key), !later, "{key} stands in the schema but not in the struct, or the other way round");
+    }
+}
+
+fn collect(value: &toml::Table, prefix: &str, seen: &mut Vec<String>) {
+    for (name, value) in value {
+        let key = tree::join(prefix, name);
+        match value {
+            toml::Value::Table(table) => collect(table, &key, seen),
+            toml::Value::Array(array) => array.iter().filter_map(toml::Value::as_table).for_each(|table| collect(table, &key, seen)),
+            _ => {}
+        }
+        seen.push(key);
+    }
+}
+
+#[test]
+fn bad_scenarios_are_named_by_file_line_and_key() {
+    let cases: &[(&str, &str)] = &[
+        ("[camera]\nfsp = 30", "dir/s.toml:7: camera.fsp: unknown key; did you mean `camera.fps`?"),
+        ("[camera.shuter]\nreadout_ms = 3", "dir/s.toml:6: camera.shuter: unknown key; did you mean `camera.shutter`?"),
+        ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
+        ("qqqq = 1", "unknown key; `camsim render --print-default`"),
+        ("[camera]\nfps = \"thirty\"", "dir/s.toml:7: camera.fps: expected a number, found \"thirty\""),
+        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers, found [640, -1]"),
+        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml"),
+        ("[camera.shutter]\nreadout = \"top-to-botom\"", "did you mean \"top-to-bottom\"?"),
+        ("[camera.shutter]\ninterlace_ms = \"feild\"", "expected a number or \"field\", found \"feild\"; did you mean \"field\"?"),
+        ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
+        ("[camera.sensor]\ngain = 1", "dir/s.toml:6: camera.sensor: is not supported by this version"),
+        ("[quality]\nsolver = \"rk2\"", "\"rk2\" is not supported by this version"),
+        ("[quality]\npreset = \"paper\"", "dir/s.toml:7: quality.preset: \"paper\" is not supported by this version"),
+        ("[output]\nchannels = [\"color\", \"flow\"]", "\"flow\" is not supported by this version"),
+        ("[camera]\nfps = nan", "dir/s.toml:7: camera.fps: must be a finite number above 0"),
+        ("[camera]\nmount = { vibration = [{ axis = \"roll\" }] }", "camera.mount.vibration.0.hz: is missing"),
+        ("[[camera.zoom]]\nat = 1\nfocal_px = [1, 0]", "dir/s.toml:8: camera.zoom.0.focal_px: must be"),
+        ("[camera", "dir/s.toml:6: not valid TOML"),
+        ("camera = \"no.toml\"", "unknown key"),
+    ];
+    for (extra, expected) in cases {
+        let error = parse(&format!("{GOOD}{extra}\n")).unwrap_err().to_string();
+        assert!(error.contains(expected), "{extra}\n  gives {error}\n  not   {expected}");
+    }
+    let empty = parse("").unwrap_err().to_string();
+    assert!(empty.contains("flight.log: is missing") && empty.contains("scene: is missing"), "{empty}");
+    assert!(parse("[flight]\nlog = \"a\"\n[scene]\n").unwrap_err().to_string().contains("scene: is empty"));
+    assert!(matches!(read_scenario(Path::new("/no/such.toml"), &[], None), Err(ScenarioError::Read { .. })));
+}
+
+#[test]
+fn set_changes_the_tree_before_it_is_read() {
+    let scenario = with(&[
+        ("camera.shutter.readout_ms", "10"),
+        ("camera.shutter.readout", "left-to-right"),
+        ("camera.shutter.interlace_ms", "field"),
+        ("quality.blur_samples", "8"),
+        ("flight.log", "my log.csv"),
+        ("output.channels", "[\"depth\"]"),
+        ("camera.mount.vibration", "[{ axis = \"roll\", hz = 5 }]"),
+        ("camera.mount.vibration.0.hz", "7.5"),
+    ])
+    .unwrap();
+    assert_eq!(scenario.camera.shutter.readout_ms, 10.0);
+    assert_eq!(scenario.camera.shutter.readout, Readout::LeftToRight);
+    assert_eq!(scenario.camera.shutter.interlace_ms, FieldOr::Field);
+    assert_eq!(scenario.quality.blur_samples, Auto::Value(8));
+    assert_eq!(scenario.flight.log, Path::new("my log.csv"));
+    assert_eq!(scenario.camera.mount.vibration[0].hz, 7.5);
+    assert_eq!(scenario.scene.pattern.unwrap().image, Path::new("dir/g.png"));
+    for (key, value, expected) in [
+        ("camera.fsp", "3", "--set camera.fsp=3: camera.fsp: unknown key; did you mean `camera.fps`?"),
+        ("camera.fps", "-3", "--set camera.fps=-3: camera.fps: must be a finite number above 0"),
+        ("camera..fps", "3", "the key is empty"),
+        ("seed.x", "3", "--set seed.x=3: seed: expected a whole number, 0 or more, found a table"),
+        ("flight.log.x", "3", "is not a table"),
+        ("camera.fps", "1\nseed = 2", "expected a number"),
+    ] {
+        let error = with(&[(key, value)]).unwrap_err().to_string();
+        assert!(error.contains(expected), "{key}={value} gives {error}");
+    }
+}
+
+#[test]
+fn a_camera_file_is_read_with_its_own_paths_and_lines() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::create_dir(dir.path().join("cams")).unwrap();
+    let camera = dir.path().join("cams/c.toml");
+    std::fs::write(&camera, "fps = 25\n[photometric]\nvignette = \"v.png\"\n").unwrap();
+    let file = dir.path().join("s.toml");
+    std::fs::write(&file, format!("\u{feff}camera = \"cams/c.toml\"\r\n{GOOD}")).unwrap();
+    let set = [("camera.shutter.exposure_ms".to_owned(), "4".to_owned())];
+    let scenario = read_scenario(&file, &set, None).unwrap();
+    assert_eq!((scenario.camera.fps, scenario.camera.shutter.exposure_ms), (25.0, 4.0));
+    assert_eq!(scenario.camera.photometric.vignette.unwrap(), dir.path().join("cams/v.png"));
+    assert_eq!(read_camera(&camera).unwrap().fps, 25.0);
+    assert!(read_scenario(&file, &[], Some(Preset::Paper)).unwrap_err().to_string().contains("quality.preset"));
+
+    std::fs::write(&camera, "fps = 25\nfocal = 3\n").unwrap();
+    let error = read_scenario(&file, &[], None).unwrap_err().to_string();
+    assert!(error.contains("c.toml:2: camera.focal: unknown key; did you mean `camera.focal_px`?"), "{error}");
+}

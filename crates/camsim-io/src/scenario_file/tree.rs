@@ -1,0 +1,160 @@
+//! The TOML tree of a scenario with the place of every key, and `--set` on it.
+
+use std::{
+    collections::HashMap,
+    fmt,
+    path::{Path, PathBuf},
+};
+
+use toml::{
+    Spanned, Table, Value,
+    de::{DeTable, DeValue},
+};
+
+use super::ScenarioError;
+
+/// Where a key was written.
+#[derive(Clone, Debug)]
+pub(super) enum Place {
+    /// File and line from 1.
+    File(PathBuf, usize),
+    /// `--set key=value`.
+    Set(String),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(file, line) => write!(f, "{}:{line}", file.display()),
+            Self::Set(text) => write!(f, "--set {text}"),
+        }
+    }
+}
+
+/// Values by nesting, places by dotted key with indices.
+pub(super) struct Tree {
+    pub(super) file: PathBuf,
+    pub(super) root: Table,
+    pub(super) places: HashMap<String, Place>,
+}
+
+impl Tree {
+    /// Reads `path`; keys are placed under `prefix`.
+    pub(super) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
+        Self::parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path, prefix)
+    }
+
+    pub(super) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
+        let line_of = |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
+        let syntax = |error: toml::de::Error| ScenarioError::Syntax {
+            path: path.into(),
+            line: error.span().map_or(1, |span| line_of(span.start)),
+            message: error.message().to_owned(),
+        };
+        let spanned = DeTable::parse(text).map_err(syntax)?;
+        let root: Table = toml::from_str(text).map_err(syntax)?;
+        let mut places = HashMap::new();
+        let mut place = |key: &str, at: usize| {
+            places.insert(key.to_owned(), Place::File(path.into(), line_of(at)));
+        };
+        place_table(spanned.get_ref(), prefix, &mut place);
+        Ok(Self { file: path.into(), root, places })
+    }
+
+    /// The place of `key`, or of the nearest table around it.
+    pub(super) fn place(&self, key: &str) -> Place {
+        let mut key = key;
+        loop {
+            if let Some(place) = self.places.get(key) {
+                return place.clone();
+            }
+            match key.rsplit_once('.') {
+                Some((parent, _)) => key = parent,
+                None => return Place::File(self.file.clone(), 1),
+            }
+        }
+    }
+
+    /// Replaces `camera = "file.toml"` by the contents of that file.
+    pub(super) fn resolve_camera(&mut self) -> Result<(), ScenarioError> {
+        let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
+        let path = self.resolve("camera", name);
+        let camera = Self::read(&path, "camera")?;
+        self.root.insert("camera".into(), Value::Table(camera.root));
+        self.places.insert("camera".into(), Place::File(path, 1));
+        self.places.extend(camera.places);
+        Ok(())
+    }
+
+    /// A path written at `key`, against the folder of its file; a path of `--set` stays relative to the working directory.
+    pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
+        match self.place(key) {
+            Place::File(file, _) => file.parent().unwrap_or(Path::new("")).join(path),
+            Place::Set(_) => path.into(),
+        }
+    }
+
+    /// Applies `--set key=text`.
+    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), ScenarioError> {
+        let shown = format!("{key}={text}");
+        let fail = |message: String| ScenarioError::Set { set: shown.clone(), message };
+        if key.is_empty() || key.split('.').any(str::is_empty) {
+            return Err(fail("the key is empty; write --set camera.fps=25".into()));
+        }
+        let mut steps: Vec<&str> = key.split('.').collect();
+        let leaf = steps.pop().unwrap_or_default();
+        let mut table = &mut self.root;
+        let mut steps = steps.into_iter().peekable();
+        while let Some(step) = steps.next() {
+            let mut next = table.entry(step).or_insert_with(|| Value::Table(Table::new()));
+            if let Value::Array(array) = next {
+                let (length, index) = (array.len(), steps.next().and_then(|index| index.parse::<usize>().ok()));
+                next = index
+                    .and_then(|index| array.get_mut(index))
+                    .ok_or_else(|| fail(format!("`{step}` is a list of {length}; name one by its number from 0, as in {step}.0.{leaf}")))?;
+            }
+            table = next.as_table_mut().ok_or_else(|| fail(format!("`{step}` is not a table, so it has no key under it")))?;
+        }
+        table.insert(leaf.into(), value(text));
+        let below = format!("{key}.");
+        self.places.retain(|place, _| !place.starts_with(&below));
+        for (end, _) in key.match_indices('.') {
+            self.places.entry(key[..end].into()).or_insert_with(|| Place::Set(shown.clone()));
+        }
+        self.places.insert(key.into(), Place::Set(shown));
+        if key == "camera" { self.resolve_camera() } else { Ok(()) }
+    }
+}
+
+/// A TOML value; what is none is a string, so that words need no quotes.
+fn value(text: &str) -> Value {
+    let parsed = toml::from_str::<Table>(&format!("v = {text}")).ok().filter(|table| table.len() == 1);
+    parsed.and_then(|mut table| table.remove("v")).unwrap_or_else(|| Value::String(text.into()))
+}
+
+pub(super) fn join(prefix: &str, key: &str) -> String {
+    if prefix.is_empty() { key.to_owned() } else { format!("{prefix}.{key}") }
+}
+
+fn place_table(table: &DeTable<'_>, prefix: &str, place: &mut dyn FnMut(&str, usize)) {
+    for (key, value) in table {
+        let name = join(prefix, key.get_ref());
+        place(&name, key.span().start);
+        place_value(value, &name, place);
+    }
+}
+
+fn place_value(value: &Spanned<DeValue<'_>>, name: &str, place: &mut dyn FnMut(&str, usize)) {
+    match value.get_ref() {
+        DeValue::Table(table) => place_table(table, name, place),
+        DeValue::Array(array) => {
+            for (index, element) in array.iter().enumerate() {
+                let name = join(name, &index.to_string());
+                place(&name, element.span().start);
+                place_value(element, &name, place);
+            }
+        }
+        _ => {}
+    }
+}
