@@ -16,6 +16,8 @@ pub mod pictures;
 
 pub mod load;
 
+pub mod builtin;
+
 pub mod write;
 
 pub mod manifest;

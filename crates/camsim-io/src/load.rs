@@ -1,10 +1,10 @@
 //! A scenario's files, read, checked against each other, and brought to one local frame: what rendering starts from.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    geodesy::{Geodetic, geoid_undulation_m},
+    geodesy::{Geodetic, GeoidCache},
     mount::{CameraPath, MountError},
     scenario::{HeightReference, PatternCentre, Scenario},
     scene::{Encoding, Mesh, Scene, linear_from_srgb},
@@ -129,7 +129,9 @@ fn load_scene(scenario: &Scenario, log: &FlightLog, shift_terrain: bool) -> Resu
     if let Some(terrain) = &spec.terrain {
         let frame = log.frame.as_ref().ok_or_else(|| LoadError::NoOrigin { log: scenario.flight.log.clone() })?;
         let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
-        let undulation = |lat_rad, lon_rad| geoid_undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 });
+        // One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each thread that reads terrain.
+        thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
+        let undulation = |lat_rad, lon_rad| GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }));
         let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
         scene.terrain = Some(loaded.terrain);
         summary = Some(loaded.summary);

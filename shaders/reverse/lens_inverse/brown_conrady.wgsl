@@ -3,7 +3,6 @@
 // Starts are kept this far inside the fold, where the Jacobian is safely regular.
 const START_SHARE_OF_FOLD: f32 = 0.95;
 const MIN_DETERMINANT: f32 = 1e-4;
-const MAX_HALVINGS: i32 = 6;
 
 fn numerator(r2: f32) -> f32 {
     let k = lens.radial;
@@ -61,6 +60,13 @@ fn table_start(distorted: vec2f) -> vec2f {
     return distorted * radial_ratio(length(distorted));
 }
 
+// -J^-1 residual.
+fn newton_step(ideal: vec2f, residual: vec2f) -> vec2f {
+    let j = jacobian(ideal);
+    let det = max(j.x * j.z - j.y * j.y, MIN_DETERMINANT);
+    return vec2f(j.y * residual.y - j.z * residual.x, j.y * residual.x - j.x * residual.y) / det;
+}
+
 // Guarded Newton. Ideal u, v, and 1 if there is such a point on the principal branch, else 0.
 fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
     let nothing = vec3f(INVALID_UV, INVALID_UV, 0.0);
@@ -73,24 +79,19 @@ fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
         ideal = scaled_to(start, min(length(start), START_SHARE_OF_FOLD * fold_radius(start)));
     }
     var residual = distort(ideal) - distorted;
+    var step = newton_step(ideal, residual);
     for (var i = 0; i < MAX_STEPS; i++) {
-        let j = jacobian(ideal);
-        let det = max(j.x * j.z - j.y * j.y, MIN_DETERMINANT);
-        var step = vec2f(j.y * residual.y - j.z * residual.x, j.y * residual.x - j.x * residual.y) / det;
         let last = length(step * lens.focal_px) < LAST_STEP_PX;
-        var next = inside(ideal, ideal + step);
-        var next_residual = distort(next) - distorted;
+        let next = inside(ideal, ideal + step);
+        let next_residual = distort(next) - distorted;
         // The last step is within rounding of the solution: whether its residual grew says nothing.
-        for (var halving = 0; halving < MAX_HALVINGS && !last; halving++) {
-            if dot(next_residual, next_residual) <= dot(residual, residual) {
-                break;
-            }
+        if last || dot(next_residual, next_residual) <= dot(residual, residual) {
+            ideal = next;
+            residual = next_residual;
+            step = newton_step(ideal, residual);
+        } else {
             step *= 0.5;
-            next = inside(ideal, ideal + step);
-            next_residual = distort(next) - distorted;
         }
-        ideal = next;
-        residual = next_residual;
         if last {
             break;
         }

@@ -34,7 +34,8 @@ const MAX_RESIDUAL_PX: f32 = 0.01;
 // Newton converges quadratically: after a step of this size the next would be below the f32 floor.
 const LAST_STEP_PX: f32 = 1e-3;
 
-const MAX_STEPS: i32 = 16;
+// Steps and halvings together; 4 are usual, a point at a fold takes some 15.
+const MAX_STEPS: i32 = 24;
 
 // Distorted normalised coordinate of a pixel's centre.
 fn distorted_from_pixel(pixel: vec2u) -> vec2f {

@@ -220,7 +220,8 @@ impl FrameWriter {
 
     fn join(&mut self) -> bool {
         self.queue = None;
-        self.workers.drain(..).map(|worker| worker.join().is_ok()).fold(true, |all, one| all && one)
+        // Counted rather than `all`, which would stop at the first failure and leave the other threads running.
+        self.workers.drain(..).filter_map(|worker| worker.join().err()).count() == 0
     }
 }
 
