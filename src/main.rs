@@ -1,1 +1,4 @@
-fn main() {}
+//! The camsim program.
+fn main() -> std::process::ExitCode {
+    camsim_cli::main()
+}

@@ -1,0 +1,12 @@
+//! One file a command: its arguments, its help, and `run`.
+
+pub mod camera;
+pub mod compare;
+pub mod completions;
+pub mod demo;
+pub mod explain;
+pub mod info;
+pub mod lens;
+pub mod render;
+pub mod track;
+pub mod viewer;

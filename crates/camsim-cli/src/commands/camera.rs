@@ -1,0 +1,70 @@
+//! `camsim camera import`.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use camsim_io::camera_file::{CameraFormat, import_camera_as};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    output::write_output,
+};
+
+/// Work with camera files
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    Import(ImportArgs),
+}
+
+/// Turn another program's calibration into a CAMERA.toml
+///
+/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, the reference program's XML, Agisoft XML and Gyroflow lens
+/// profiles. The format is told by content; if several fit, nothing is guessed and --format names the one that is meant.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: camsim camera import camchain.yaml -o CAMERA.toml")]
+struct ImportArgs {
+    /// Calibration file
+    file: PathBuf,
+    /// Where the camera goes; standard output if left out
+    #[arg(short, long, value_name = "CAMERA.toml")]
+    output: Option<PathBuf>,
+    /// Read the file as this format
+    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(CameraFormat::ALL.map(CameraFormat::name)))]
+    format: Option<String>,
+}
+
+/// Runs a camera command.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    match &args.command {
+        Command::Import(args) => import(args, console),
+    }
+}
+
+fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let format = match &args.format {
+        None => None,
+        Some(name) => {
+            let known = CameraFormat::ALL.into_iter().find(|format| format.name() == name);
+            Some(known.ok_or_else(|| Failure::bad_input(anyhow!("--format {name} is not known")))?)
+        }
+    };
+    let imported = import_camera_as(&args.file, format).or_bad_input()?;
+    console.note(format_args!("{}: read as {}", args.file.display(), imported.format.name()));
+    for note in &imported.notes {
+        console.note(format_args!("note: {note}"));
+    }
+    let header = format!("# Imported from {} ({}).\n", file_name(&args.file), imported.format.name());
+    let text = header + &toml::to_string(&imported.spec).or_failed()?;
+    write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
+}
+
+fn file_name(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().replace(|c: char| c.is_control(), " ")
+}

@@ -1,0 +1,56 @@
+//! `camsim compare`.
+
+use std::path::PathBuf;
+
+use camsim_io::compare::{Figures, compare_paths};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+};
+
+/// Compare two pictures, or two folders of pictures
+///
+/// Values are compared as stored, a code range being 0 to 1: EXR with EXR (linear), PNG with PNG (encoded). In folders, pictures of the
+/// same name are compared.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: camsim compare out/color other/color --json")]
+pub struct Args {
+    /// First picture or folder
+    a: PathBuf,
+    /// Second picture or folder
+    b: PathBuf,
+    /// Print JSON: rmse, max, psnr_db (null for equal pictures), ssim, differing, and each file of a folder
+    #[arg(long)]
+    json: bool,
+}
+
+/// Prints how much two things differ.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let report = compare_paths(&args.a, &args.b).or_bad_input()?;
+    if args.json {
+        return Ok(console.json(&report)?);
+    }
+    for (only, folder) in [(&report.only_in_a, &args.a), (&report.only_in_b, &args.b)] {
+        if !only.is_empty() {
+            console.warn(format_args!("{} pictures are only in {}", only.len(), folder.display()));
+        }
+    }
+    console.line(format_args!("{:>11} {:>11} {:>9} {:>8} {:>11}", "RMSE", "max", "PSNR dB", "SSIM", "differing"))?;
+    for file in &report.files {
+        console.line(format_args!("{} {}", row(&file.figures), file.file))?;
+    }
+    let all = if report.files.is_empty() { String::new() } else { format!(" all {} pictures", report.files.len()) };
+    console.line(row(&report.total) + &all)?;
+    if report.total.non_finite > 0 {
+        console.warn(format_args!("{} pixels hold a NaN or an infinity and count only as differing", report.total.non_finite));
+    }
+    Ok(())
+}
+
+fn row(figures: &Figures) -> String {
+    let Figures { rmse, max, psnr_db, ssim, differing, .. } = figures;
+    let psnr = psnr_db.map_or("inf".to_owned(), |psnr| format!("{psnr:.2}"));
+    let ssim = ssim.map_or("-".to_owned(), |ssim| format!("{ssim:.5}"));
+    format!("{rmse:>11.4e} {max:>11.4e} {psnr:>9} {ssim:>8} {:>9.3} %", 100.0 * differing)
+}

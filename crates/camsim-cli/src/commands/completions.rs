@@ -1,0 +1,20 @@
+//! `camsim completions`.
+
+use crate::{console::Console, failure::Failure};
+
+/// Print completions for a shell
+///
+/// For example: camsim completions bash > ~/.local/share/bash-completion/completions/camsim
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Which shell
+    shell: clap_complete::Shell,
+}
+
+/// Prints the script for the command line `C`.
+pub fn run<C: clap::CommandFactory>(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut C::command(), "camsim", &mut script);
+    console.stdout().write_all(&script)?;
+    Ok(())
+}

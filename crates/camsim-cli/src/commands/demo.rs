@@ -1,0 +1,127 @@
+//! `camsim demo`: pictures without a scenario of one's own.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use camsim_core::{frame::RenderedFrame, mount::CameraPath, scenario::LensSpec, sequence::Sequence};
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_io::write::{WriteError, contact_sheet, write_atomic};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    inputs::{self, ScenarioArgs},
+    render_run::{self, Job},
+};
+
+/// Every n-th frame of the built-in flight is rendered: the turn shows in a few seconds of work.
+const FRAME_STEP: usize = 4;
+/// Thumbnails of the contact sheet, and how many stand side by side.
+const SHEET_FRAMES: usize = 12;
+const SHEET_COLUMNS: u32 = 4;
+/// Thumbnails are smaller by this factor.
+const SHEET_SHRINK: u32 = 2;
+
+/// The built-in scene lies in the program, so that the program alone suffices.
+macro_rules! assets {
+    ($($name:literal),*) => {
+        [$(($name, include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/", $name)).as_slice())),*]
+    };
+}
+
+const ASSETS: [(&str, &[u8]); 8] = assets![
+    "demo.toml",
+    "demo_camera.toml",
+    "demo_flight.csv",
+    "demo_dem.tif",
+    "demo_ortho.jpg",
+    "vignette.png",
+    "pattern.toml",
+    "acircles.png"
+];
+
+/// Render the built-in flight: nothing to prepare
+///
+/// Writes EXR and PNG frames, a contact sheet, and one frame as a perfect and as the imperfect camera sees it.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Output folder
+    #[arg(short, long, value_name = "DIR", default_value = "camsim-demo")]
+    output: PathBuf,
+}
+
+/// Renders the built-in flight.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let folder = &args.output;
+    // The adapter first: without one there is no need to read anything.
+    let engine = Engine::new(AdapterChoice::Best)?;
+    console.note(format_args!("rendering on {}", engine.gpu().adapter));
+    let scene = unpack(folder)?;
+    let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read()?;
+    let loaded = inputs::load(&scenario, console)?;
+    let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
+    let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
+    let mut thumbnails = Vec::new();
+    let every = (frames.len() / SHEET_FRAMES).max(1);
+    let mut seen = 0;
+    let outcome = render_run::run(&job, &engine, console, &mut |finished| {
+        if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
+            thumbnails.push(finished.frame.clone());
+        }
+        seen += 1;
+    })?;
+    let sheet = folder.join("contact-sheet.png");
+    contact_sheet(&sheet, &thumbnails, SHEET_COLUMNS, SHEET_SHRINK).or_failed()?;
+    let pair = folder.join("perfect-and-real.png");
+    let middle = frames[frames.len() / 2];
+    let flawless = Arc::new(without_flaws(&loaded.sequence)?);
+    let both = [render_one(&engine, &flawless, middle)?, render_one(&engine, &loaded.sequence, middle)?];
+    contact_sheet(&pair, &both, 2, 1).or_failed()?;
+
+    let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
+    console.line(format_args!("{} frames in {seconds:.2} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))?;
+    console.line(format_args!("  {}/   linear EXR and sRGB PNG", folder.join("color").display()))?;
+    console.line(format_args!("  {}/    time and pose of each row", folder.join("rows").display()))?;
+    console.line(format_args!("  {}   the flight at a glance", sheet.display()))?;
+    console.line(format_args!("  {}   frame {middle} without and with the camera's flaws", pair.display()))?;
+    console.line("next")?;
+    console.line(format_args!("  camsim explain {}", scene.display()))?;
+    console.line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
+    console.line(format_args!("  camsim viewer {}", scene.display()))?;
+    Ok(())
+}
+
+/// Puts the built-in scene into `folder/scene` and gives its scenario.
+fn unpack(folder: &Path) -> Result<PathBuf, Failure> {
+    let scene = folder.join("scene");
+    for (name, bytes) in ASSETS {
+        write_atomic(&scene.join(name), bytes).or_failed()?;
+    }
+    Ok(scene.join("demo.toml"))
+}
+
+/// The same flight through a pinhole with an instant global shutter on a still mount, without noise and vignette.
+fn without_flaws(sequence: &Sequence) -> Result<Sequence, Failure> {
+    let mut flawless = sequence.clone();
+    let camera = &mut flawless.scenario.camera;
+    camera.lens = LensSpec::default();
+    camera.shutter = Default::default();
+    camera.photometric.vignette = None;
+    camera.photometric.noise_sigma = 0.0;
+    camera.mount.vibration.clear();
+    flawless.vignette = None;
+    flawless.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &camera.mount).or_bad_input()?);
+    Ok(flawless)
+}
+
+fn render_one(engine: &Engine, sequence: &Arc<Sequence>, frame: u64) -> Result<RenderedFrame, Failure> {
+    let mut rendered = RenderedFrame::default();
+    let mut session = engine.session::<WriteError>(sequence.clone(), &sequence.scenario.output.channels)?;
+    session.render::<WriteError>([frame], &mut |finished| {
+        rendered = finished.frame;
+        Ok(())
+    })?;
+    Ok(rendered)
+}

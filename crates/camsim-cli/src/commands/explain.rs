@@ -1,0 +1,141 @@
+//! `camsim explain`: what one frame takes, without rendering it.
+
+use camsim_core::{
+    plan::{PlanSummary, Planner},
+    tracker::{ResolvedLimits, Saturation},
+};
+use camsim_io::{load::Loaded, terrain::TerrainSummary};
+use serde::Serialize;
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    frame_list::FrameListError,
+    inputs::{self, ScenarioArgs},
+};
+
+/// Largest texture side that plans are made for here: every adapter of the last decade has it, and `explain` needs none.
+const MAX_SIDE_PX: u32 = 16_384;
+
+/// Show what a frame takes: passes, sizes, samples, bounds, and each thing skipped with its reason
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example: camsim explain flight.toml --frame 7 --set camera.shutter.exposure_ms=0")]
+pub struct Args {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Frame number, from 0
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    frame: u64,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Explained<'a> {
+    frames: u64,
+    log: Log,
+    tracker: Tracker,
+    terrain: Option<Terrain>,
+    warnings: &'a [String],
+    plan: PlanSummary<'a>,
+}
+
+#[derive(Serialize)]
+struct Log {
+    file: String,
+    rows: usize,
+    span_s: [f64; 2],
+    cleaning: String,
+}
+
+#[derive(Serialize)]
+struct Tracker {
+    rate_hz: f64,
+    limits: ResolvedLimits,
+    saturation: Saturation,
+}
+
+#[derive(Serialize)]
+struct Terrain {
+    epsg: u16,
+    size: [u32; 2],
+    south_west_deg: [f64; 2],
+    north_east_deg: [f64; 2],
+    height_range_m: [f64; 2],
+    void_heights: u64,
+    outside_ortho: u64,
+    finest_triangles: u64,
+}
+
+/// Loads the scenario and prints the plan of one frame.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let scenario = args.scenario.read()?;
+    let loaded = inputs::load(&scenario, console)?;
+    let frames = loaded.sequence.frames;
+    if args.frame >= frames {
+        return Err(Failure::bad_input(FrameListError::Outside { frame: args.frame, frames }));
+    }
+    let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
+    let plan = planner.plan(args.frame).or_bad_input()?;
+    let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
+    let tracked = &loaded.tracked;
+    let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
+    if args.json {
+        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings: &loaded.warnings, plan: plan.summary() })?);
+    }
+    let [first_s, last_s] = log.span_s;
+    console.line(format_args!("log {}", log.file))?;
+    console.line(format_args!("  {} rows from {first_s:.3} to {last_s:.3} s, {}", log.rows, log.cleaning))?;
+    console.line(format_args!("tracker at {} Hz", tracker.rate_hz))?;
+    let limits = tracker.limits;
+    console.line(format_args!("  at most {:.3} m/s, {:.3} m/s^2", limits.max_speed_m_s, limits.max_acceleration_m_s2))?;
+    let angular = [limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2].map(f64::to_degrees);
+    console.line(format_args!("  at most {:.3} deg/s, {:.3} deg/s^2", angular[0], angular[1]))?;
+    if let Some(terrain) = &terrain {
+        print_terrain(terrain, console)?;
+    }
+    console.line(format_args!("sequence of {frames} frames"))?;
+    console.print(&plan.to_string())?;
+    Ok(())
+}
+
+fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Failure> {
+    let Terrain { epsg, size: [columns, rows], south_west_deg, north_east_deg, height_range_m, .. } = terrain;
+    console.line(format_args!("terrain of {columns}x{rows} heights, EPSG:{epsg}"))?;
+    console.line(format_args!(
+        "  latitude {:.5} to {:.5}, longitude {:.5} to {:.5} deg, heights {:.1} to {:.1} m",
+        south_west_deg[0], north_east_deg[0], south_west_deg[1], north_east_deg[1], height_range_m[0], height_range_m[1]
+    ))?;
+    let (voids, outside) = (terrain.void_heights, terrain.outside_ortho);
+    console.line(format_args!(
+        "  {voids} heights missing, {outside} outside of the ortho-image, {} triangles at the finest level",
+        terrain.finest_triangles
+    ))?;
+    Ok(())
+}
+
+fn log_facts(loaded: &Loaded) -> Log {
+    let rows = &loaded.log.rows;
+    let (first_s, last_s) = (rows.first().map_or(0.0, |row| row.t_s), rows.last().map_or(0.0, |row| row.t_s));
+    Log {
+        file: loaded.sequence.scenario.flight.log.display().to_string(),
+        rows: rows.len(),
+        span_s: [first_s, last_s],
+        cleaning: loaded.log.report.to_string(),
+    }
+}
+
+fn terrain_facts(summary: &TerrainSummary) -> Terrain {
+    let [columns, rows] = summary.size.map(|heights| u64::from(heights.saturating_sub(1)));
+    Terrain {
+        epsg: summary.epsg,
+        size: summary.size,
+        south_west_deg: summary.south_west_rad.map(f64::to_degrees),
+        north_east_deg: summary.north_east_rad.map(f64::to_degrees),
+        height_range_m: summary.height_range_m,
+        void_heights: summary.void_heights,
+        outside_ortho: summary.outside_ortho,
+        finest_triangles: 2 * columns * rows,
+    }
+}

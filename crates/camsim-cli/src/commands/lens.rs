@@ -1,0 +1,216 @@
+//! `camsim lens`: points through a camera's lens, and what the calibration is worth.
+
+use std::{
+    fs::File,
+    io::{self, Read},
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, anyhow, bail};
+use camsim_core::camera::{CameraModel, LensCheck};
+use camsim_io::{camera_file::read_camera_toml, scenario_file::read_scenario};
+use glam::DVec2;
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    output::write_output,
+};
+
+/// Take points through a camera's lens, or check the lens
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim lens CAMERA.toml distort --points rays.csv -o pixels.csv
+  echo 'x_px,y_px
+  319.5,239.5' | camsim lens flight.toml undistort
+  camsim lens CAMERA.toml check --json")]
+pub struct Args {
+    /// Camera file, or a scenario: its [camera] is used
+    camera: PathBuf,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Command {
+    /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px
+    Distort(PointsArgs),
+    /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no answer)
+    Undistort(PointsArgs),
+    /// Where the model folds, how much of the image has an inverse, and the worst forward-backward error
+    Check {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct PointsArgs {
+    /// CSV of points; standard input if left out
+    #[arg(long, value_name = "CSV")]
+    points: Option<PathBuf>,
+    /// Where the answers go, a row for each row; standard output if left out
+    #[arg(short, long, value_name = "CSV")]
+    output: Option<PathBuf>,
+}
+
+/// Runs a lens command.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let camera = read_camera(&args.camera)?;
+    match &args.command {
+        Command::Distort(points) => distort(&camera, points, console),
+        Command::Undistort(points) => undistort(&camera, points, console),
+        Command::Check { json } => check(&camera, *json, console),
+    }
+}
+
+/// A camera file has its keys at the root, a scenario has them in `[camera]`.
+fn read_camera(path: &Path) -> Result<CameraModel, Failure> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display())).or_bad_input()?;
+    // What is not TOML at all is for the reader of camera files to explain.
+    let root: toml::Table = text.parse().unwrap_or_default();
+    let spec = if root.contains_key("camera") || root.contains_key("flight") {
+        read_scenario(path, &[], None).or_bad_input()?.camera
+    } else {
+        read_camera_toml(path).or_bad_input()?
+    };
+    CameraModel::from_spec(&spec).with_context(|| path.display().to_string()).or_bad_input()
+}
+
+fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let points = read_points(args.points.as_deref(), ["u", "v"]).or_bad_input()?;
+    let beyond = points.iter().filter(|ideal| !camera.lens.contains(**ideal)).count();
+    write_output(args.output.as_deref(), console, |out| {
+        writeln!(out, "x_px,y_px")?;
+        for pixel in points.iter().map(|ideal| camera.project(*ideal)) {
+            writeln!(out, "{:?},{:?}", pixel.x, pixel.y)?;
+        }
+        Ok(())
+    })?;
+    if beyond > 0 {
+        console.warn(format_args!(
+            "{beyond} of {} points lie beyond the fold of the lens: the formula gives them pixels, but no camera shows them there",
+            points.len()
+        ));
+    }
+    Ok(())
+}
+
+fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
+    let points = read_points(args.points.as_deref(), ["x_px", "y_px"]).or_bad_input()?;
+    write_output(args.output.as_deref(), console, |out| {
+        writeln!(out, "u,v,valid")?;
+        for ideal in points.iter().map(|pixel| camera.unproject(*pixel)) {
+            match ideal {
+                Some(ideal) => writeln!(out, "{:?},{:?},1", ideal.x, ideal.y)?,
+                None => writeln!(out, "NaN,NaN,0")?,
+            }
+        }
+        Ok(())
+    })
+}
+
+fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {
+    let check = camera.check();
+    if json {
+        console.json(&check)?;
+        return Ok(());
+    }
+    let LensCheck { valid_fraction, fold_radius_min, fold_radius_max, worst_roundtrip_px, bijective } = check;
+    console.line(format_args!("pixels with an ideal ray       {:.3} %", 100.0 * valid_fraction))?;
+    match (fold_radius_min, fold_radius_max) {
+        (Some(min), Some(max)) => console.line(format_args!("folds at ideal radius |(u, v)|  {min:.6} to {max:.6}"))?,
+        _ => console.line("folds                          nowhere")?,
+    }
+    console.line(format_args!("worst forward-backward error   {worst_roundtrip_px:.3e} px"))?;
+    let answer = if bijective { "yes" } else { "no: some pixels have several ideal rays, so this calibration is not usable there" };
+    console.line(format_args!("one ray a pixel                {answer}"))?;
+    Ok(())
+}
+
+/// Points of a CSV by the names of their columns; two bare columns of numbers need no header. Lines that begin with `#` are comments.
+fn read_points(path: Option<&Path>, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
+    let (name, input): (String, Box<dyn Read>) = match path {
+        Some(path) => {
+            let name = path.display().to_string();
+            let file = File::open(path).with_context(|| format!("{name}: cannot be read"))?;
+            (name, Box::new(io::BufReader::new(file)))
+        }
+        None => ("standard input".to_owned(), Box::new(io::stdin().lock())),
+    };
+    parse_points(input, columns).with_context(|| name)
+}
+
+fn parse_points(input: impl Read, columns: [&str; 2]) -> anyhow::Result<Vec<DVec2>> {
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(input);
+    let mut places = None;
+    let mut points = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if places.is_none() {
+            if let Some(found) = header(&record, columns) {
+                places = Some(found);
+                continue;
+            }
+            if record.len() != 2 {
+                bail!("line {line}: the columns {} are missing; give a header that names them", columns.join(","));
+            }
+        }
+        let places = *places.get_or_insert([0, 1]);
+        let number = |i: usize| -> anyhow::Result<f64> {
+            let text = record.get(places[i]).ok_or_else(|| anyhow!("line {line}: {} is missing", columns[i]))?;
+            text.parse().map_err(|_| {
+                anyhow!("line {line}: {} is `{text}`, which is no number; expected the columns {}", columns[i], columns.join(","))
+            })
+        };
+        points.push(DVec2::new(number(0)?, number(1)?));
+    }
+    Ok(points)
+}
+
+/// Where the columns are, if the row names both. A byte-order mark may precede the first name.
+fn header(row: &csv::StringRecord, columns: [&str; 2]) -> Option<[usize; 2]> {
+    let place = |name: &str| row.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name));
+    Some([place(columns[0])?, place(columns[1])?])
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    const UV: [&str; 2] = ["u", "v"];
+
+    #[test]
+    fn points_are_read_by_name_or_by_place() {
+        let both = vec![DVec2::new(1.0, 2.0), DVec2::new(-3.5, 4e-3)];
+        for text in [
+            "u,v\n1,2\n-3.5,4e-3\n",
+            "1,2\n-3.5,0.004",
+            "\u{feff}id, V ,u\r\n7,2,1\r\n8,4e-3,-3.5\r\n",
+            "# rays\nu,v\n1,2\n# more\n-3.5,4e-3\n",
+        ] {
+            assert_eq!(parse_points(text.as_bytes(), UV).unwrap(), both, "{text}");
+        }
+        assert_eq!(parse_points("".as_bytes(), UV).unwrap(), []);
+        assert_eq!(parse_points("u,v\n".as_bytes(), UV).unwrap(), []);
+    }
+
+    #[test]
+    fn wrong_points_are_named_by_line() {
+        for (text, wanted) in [
+            ("u,v\n1,x\n", "line 2: v is `x`"),
+            ("u,v\n1\n", "line 2: v is missing"),
+            ("a,b,c\n1,2,3\n", "columns u,v are missing"),
+            ("x_px,y_px\n1,2\n", "expected the columns u,v"),
+        ] {
+            let error = format!("{:#}", parse_points(text.as_bytes(), UV).unwrap_err());
+            assert!(error.contains(wanted), "{error}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! `camsim render`: the main job.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::anyhow;
+use camsim_core::scenario::{Channel, ImageFormat, Scenario};
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_io::scenario_file::print_default;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    frame_list::{FrameList, Shard},
+    inputs::{self, Changes, ScenarioArgs},
+    render_run::{self, Job},
+};
+
+/// Render the frames of a scenario
+///
+/// Writes a folder with the frames, camera.toml, trajectory.csv, frames.csv (stamp, pose and files of each frame) and run.json, by which
+/// the run can be repeated.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim render flight.toml
+  camsim render flight.toml -o out --frames 0..100 --outputs color,depth,rows --format exr,png
+  camsim render flight.toml --set camera.lens.model=pinhole --set 'camera.lens.coefficients=[]'
+  camsim render flight.toml -o out --shard 2/4        the second of four machines
+  camsim render flight.toml -o out --resume           only what is missing
+  camsim render --print-default > flight.toml         a scenario to begin with")]
+pub struct Args {
+    /// Scenario (TOML)
+    #[arg(required_unless_present = "print_default")]
+    scenario: Option<PathBuf>,
+    /// Output folder; the scenario's name + "-frames" if left out
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Which frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; all if left out
+    #[arg(long, value_name = "LIST")]
+    frames: Option<FrameList>,
+    #[command(flatten)]
+    changes: Changes,
+    /// What renders
+    #[arg(long, value_enum, default_value_t = Backend::Gpu)]
+    backend: Backend,
+    /// Channels instead of output.channels
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = channel_parser())]
+    outputs: Option<Vec<Channel>>,
+    /// File formats instead of output.format; none renders and reads back but writes no frame (for timing)
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    format: Option<Vec<Format>>,
+    /// Keep frames that are there already; refused if the folder is of another scenario
+    #[arg(long)]
+    resume: bool,
+    /// Render the I-th of N parts only, I from 1
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Print a scenario with every key, its default and its meaning, and stop
+    #[arg(long, exclusive = true)]
+    print_default: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Backend {
+    /// The engine on wgpu, also on a software adapter
+    Gpu,
+    /// The slow exact renderer (not in this version)
+    Reference,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    /// OpenEXR, linear
+    Exr,
+    /// PNG in the encoding of camera.photometric.output
+    Png,
+    /// No files of frames
+    None,
+}
+
+const CHANNELS: [(&str, Channel); 5] =
+    [("color", Channel::Color), ("depth", Channel::Depth), ("valid", Channel::Valid), ("rows", Channel::Rows), ("coords", Channel::Coords)];
+
+fn channel_parser() -> impl TypedValueParser<Value = Channel> {
+    PossibleValuesParser::new(CHANNELS.map(|(name, _)| name)).try_map(|name| {
+        let known = CHANNELS.into_iter().find(|(known, _)| *known == name);
+        known.map(|(_, channel)| channel).ok_or_else(|| format!("`{name}` is no channel"))
+    })
+}
+
+/// Renders a scenario.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let Some(path) = args.scenario.clone() else {
+        return Ok(console.print(&print_default())?);
+    };
+    if args.backend == Backend::Reference {
+        return Err(Failure::bad_input(anyhow!("--backend reference is not in this version; leave it out to render with the gpu backend")));
+    }
+    let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
+    let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read()?;
+    let scenario = with_outputs(scenario, args)?;
+    let loaded = inputs::load(&scenario, console)?;
+    let frames = match &args.frames {
+        None => (0..loaded.sequence.frames).collect(),
+        Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
+    };
+    let engine = Engine::new(AdapterChoice::Best)?;
+    console.detail(format_args!("adapter: {}", engine.gpu().adapter));
+    let job = Job {
+        sequence: &loaded.sequence,
+        folder: &folder,
+        frames: &frames,
+        shard: args.shard,
+        resume: args.resume,
+        warnings: &loaded.warnings,
+    };
+    let outcome = render_run::run(&job, &engine, console, &mut |_| {})?;
+    if !console.is_quiet() {
+        let kept = if outcome.skipped > 0 { format!(" ({} were there already)", outcome.skipped) } else { String::new() };
+        let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
+        console.line(format_args!("{} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))?;
+    }
+    Ok(())
+}
+
+fn default_folder(scenario: &Path) -> PathBuf {
+    let mut name = scenario.file_stem().unwrap_or("camsim".as_ref()).to_owned();
+    name.push("-frames");
+    PathBuf::from(name)
+}
+
+/// `--outputs` and `--format` in place of `[output]`.
+fn with_outputs(mut scenario: Scenario, args: &Args) -> Result<Scenario, Failure> {
+    if let Some(channels) = &args.outputs {
+        scenario.output.channels = without_repeats(channels);
+    }
+    if let Some(formats) = &args.format {
+        let images = formats.iter().filter_map(|format| match format {
+            Format::Exr => Some(ImageFormat::Exr),
+            Format::Png => Some(ImageFormat::Png),
+            Format::None => None,
+        });
+        scenario.output.format = without_repeats(&images.collect::<Vec<_>>());
+        if formats.contains(&Format::None) && !scenario.output.format.is_empty() {
+            return Err(Failure::bad_input(anyhow!("--format none stands alone: leave it out, or the other formats")));
+        }
+    }
+    Ok(scenario)
+}
+
+fn without_repeats<T: Copy + PartialEq>(items: &[T]) -> Vec<T> {
+    let mut kept = Vec::new();
+    for &item in items {
+        if !kept.contains(&item) {
+            kept.push(item);
+        }
+    }
+    kept
+}

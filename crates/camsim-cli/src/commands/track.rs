@@ -1,0 +1,169 @@
+//! `camsim track`: the platform's motion without any picture.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use camsim_core::{
+    tracker::{Channels, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
+    trajectory::Trajectory,
+};
+use camsim_io::write::trajectory_csv;
+use serde::Serialize;
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    inputs::{self, ScenarioArgs},
+    output::write_output,
+    render_run,
+};
+
+/// Rows that a trajectory file may have: the table is made in memory, about 300 bytes a row.
+const MOST_ROWS: f64 = 10e6;
+
+/// Follow the flight log and print the motion, without pictures
+///
+/// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz (body rates, rad/s),
+/// alphax,alphay,alphaz (rad/s^2). t_s is as in the log.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim track flight.toml -o traj.csv
+  camsim track flight.toml --report --set tracker.kind=spline")]
+pub struct Args {
+    #[command(flatten)]
+    scenario: ScenarioArgs,
+    /// Rows a second; tracker.rate_hz if left out
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Where the motion goes; standard output if left out (with --report: not written then)
+    #[arg(short, long, value_name = "CSV")]
+    output: Option<PathBuf>,
+    /// Print RMS and largest error against the interpolated log, and the largest speeds and accelerations used
+    #[arg(long)]
+    report: bool,
+    /// Print the report as JSON
+    #[arg(long, requires = "report")]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    rate_hz: f64,
+    #[serde(flatten)]
+    measured: &'a TrackReport,
+    limits: ResolvedLimits,
+    saturation: Saturation,
+}
+
+/// Tracks the log, writes the motion, prints the report.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let scenario = args.scenario.read()?;
+    let loaded = inputs::load(&scenario, console)?;
+    let tracked = &loaded.tracked;
+    let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
+    let rows = row_count(&tracked.trajectory, rate_hz)?;
+    if args.output.is_some() || !args.report {
+        let trajectory = &tracked.trajectory;
+        let last_s = trajectory.span_s().0 + (rows - 1) as f64 / rate_hz;
+        let records = render_run::motion(trajectory, loaded.sequence.epoch_ns, rate_hz, [trajectory.span_s().0, last_s]);
+        let table = trajectory_csv(records);
+        write_output(args.output.as_deref(), console, |out| out.write_all(table.as_bytes()))?;
+    }
+    if let Some(path) = &args.output {
+        console.note(format_args!("{rows} rows in {}", path.display()));
+    }
+    if args.report {
+        let measured =
+            tracked.report(&loaded.log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
+        report(args.json, tracked, &measured, console)?;
+    }
+    Ok(())
+}
+
+fn row_count(trajectory: &Trajectory, rate_hz: f64) -> Result<u64, Failure> {
+    let (start_s, end_s) = trajectory.span_s();
+    let rows = ((end_s - start_s) * rate_hz + 1e-6).floor() + 1.0;
+    if !(rate_hz > 0.0 && rate_hz.is_finite()) {
+        return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: must be a finite number of hertz above 0")));
+    }
+    if rows > MOST_ROWS {
+        return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: {rows:.0} rows are more than {MOST_ROWS:.0}; lower the rate")));
+    }
+    Ok(rows as u64)
+}
+
+fn report(json: bool, tracked: &Tracked, measured: &TrackReport, console: &mut Console<'_>) -> Result<(), Failure> {
+    let Tracked { limits, saturation, rate_hz, .. } = *tracked;
+    if json {
+        return Ok(console.json(&Report { rate_hz, measured, limits, saturation })?);
+    }
+    let TrackReport { rms, max_error, max_used, samples, .. } = measured;
+    console.line(format_args!("{samples} instants at {rate_hz} Hz, against the interpolated log"))?;
+    console.line(format_args!("{:<12} {:>12} {:>12}", "error", "RMS", "max"))?;
+    for ((name, rms), (_, max)) in channels(rms).into_iter().zip(channels(max_error)) {
+        console.line(format_args!("{name:<12} {rms:>12.5} {max:>12.5}"))?;
+    }
+    console.line(format_args!("{:<28} {:>12} {:>12} {:>12}", "motion", "used at most", "limit", "held back, s"))?;
+    for (name, used, limit, held_s) in motion(max_used, &limits, &saturation) {
+        console.line(format_args!("{name:<28} {used:>12.4} {limit:>12.4} {held_s:>12.3}"))?;
+    }
+    Ok(())
+}
+
+fn channels(errors: &Channels) -> [(&'static str, f64); 7] {
+    let Channels { north_m, east_m, down_m, roll_deg, pitch_deg, yaw_deg, attitude_deg } = *errors;
+    [
+        ("north m", north_m),
+        ("east m", east_m),
+        ("down m", down_m),
+        ("roll deg", roll_deg),
+        ("pitch deg", pitch_deg),
+        ("yaw deg", yaw_deg),
+        ("attitude deg", attitude_deg),
+    ]
+}
+
+fn motion(used: &MotionUse, limits: &ResolvedLimits, held: &Saturation) -> [(&'static str, f64, f64, f64); 4] {
+    [
+        ("speed m/s", used.speed_m_s, limits.max_speed_m_s, held.speed_s),
+        ("acceleration m/s^2", used.acceleration_m_s2, limits.max_acceleration_m_s2, held.acceleration_s),
+        ("angular rate deg/s", used.angular_rate_deg_s, limits.max_angular_rate_rad_s.to_degrees(), held.angular_rate_s),
+        (
+            "angular acceleration deg/s^2",
+            used.angular_acceleration_deg_s2,
+            limits.max_angular_acceleration_rad_s2.to_degrees(),
+            held.angular_acceleration_s,
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use camsim_core::pose::BodyState;
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+
+    fn still() -> BodyState {
+        BodyState {
+            position_ned_m: DVec3::new(1.0, 2.0, -3.0),
+            velocity_ned_m_s: DVec3::ZERO,
+            acceleration_ned_m_s2: DVec3::ZERO,
+            ned_from_body: DQuat::IDENTITY,
+            rate_body_rad_s: DVec3::ZERO,
+            angular_acceleration_body_rad_s2: DVec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn hopeless_rates_are_refused() {
+        let trajectory = Trajectory::listed(vec![0.0], 10.0, vec![still()]).unwrap();
+        assert_eq!(row_count(&trajectory, 10.0).unwrap(), 101);
+        for rate_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
+            assert_eq!(row_count(&trajectory, rate_hz).unwrap_err().code(), crate::failure::BAD_INPUT, "{rate_hz}");
+        }
+    }
+}

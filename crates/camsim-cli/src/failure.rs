@@ -1,0 +1,140 @@
+//! How a command fails: an error and the exit code that goes with it.
+
+use std::{fmt, io};
+
+use camsim_gpu::{GpuError, RenderError};
+
+/// Exit code of success.
+pub const DONE: u8 = 0;
+/// Exit code of a failure on the way.
+pub const FAILED: u8 = 1;
+/// Exit code of wrong usage or bad input.
+pub const BAD_INPUT: u8 = 2;
+/// Exit code of a machine without an adapter.
+pub const NO_ADAPTER: u8 = 3;
+
+/// An error with its exit code.
+#[derive(Debug)]
+pub struct Failure {
+    code: u8,
+    error: anyhow::Error,
+}
+
+impl Failure {
+    /// Wrong usage or bad input.
+    pub fn bad_input(error: impl Into<anyhow::Error>) -> Self {
+        Self { code: BAD_INPUT, error: error.into() }
+    }
+
+    /// Anything that went wrong with good input.
+    pub fn failed(error: impl Into<anyhow::Error>) -> Self {
+        Self { code: FAILED, error: error.into() }
+    }
+
+    /// The exit code.
+    #[must_use]
+    pub fn code(&self) -> u8 {
+        self.code
+    }
+
+    /// Whether whoever read the output has left, which is no failure (`camsim ... | head`).
+    #[must_use]
+    pub fn is_broken_pipe(&self) -> bool {
+        let of_pipe = |cause: &(dyn std::error::Error + 'static)| {
+            cause.downcast_ref::<io::Error>().is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+        };
+        self.error.chain().any(of_pipe)
+    }
+}
+
+impl fmt::Display for Failure {
+    /// `error: ...`, then a line `caused by: ...` for each cause that the lines before do not state already.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut said = self.error.to_string();
+        write!(f, "error: {said}")?;
+        for cause in self.error.chain().skip(1).map(ToString::to_string) {
+            if !said.contains(&cause) {
+                write!(f, "\n  caused by: {cause}")?;
+                said.push_str(&cause);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl From<io::Error> for Failure {
+    fn from(error: io::Error) -> Self {
+        Self::failed(error)
+    }
+}
+
+impl From<GpuError> for Failure {
+    fn from(error: GpuError) -> Self {
+        let code = match error {
+            GpuError::NoAdapter(_) => NO_ADAPTER,
+            GpuError::TooLarge { .. } => BAD_INPUT,
+            _ => FAILED,
+        };
+        Self { code, error: error.into() }
+    }
+}
+
+impl<E: std::error::Error + Send + Sync + 'static> From<RenderError<E>> for Failure {
+    fn from(error: RenderError<E>) -> Self {
+        match error {
+            RenderError::Gpu(error) => error.into(),
+            RenderError::Plan(error) => Self::bad_input(error),
+            RenderError::Shader(error) => Self::failed(error),
+            RenderError::Sink(error) => Self::failed(error),
+        }
+    }
+}
+
+/// Says which exit code an error of a library means here.
+pub trait OrFail<T> {
+    /// The user's input is at fault.
+    fn or_bad_input(self) -> Result<T, Failure>;
+    /// The work is at fault.
+    fn or_failed(self) -> Result<T, Failure>;
+}
+
+impl<T, E: Into<anyhow::Error>> OrFail<T> for Result<T, E> {
+    fn or_bad_input(self) -> Result<T, Failure> {
+        self.map_err(Failure::bad_input)
+    }
+
+    fn or_failed(self) -> Result<T, Failure> {
+        self.map_err(Failure::failed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use anyhow::Context;
+
+    use super::*;
+
+    #[test]
+    fn causes_are_listed_once() {
+        let deep = anyhow::anyhow!("disk full").context("frame_000001.exr: cannot be written: disk full").context("rendering stopped");
+        assert_eq!(
+            Failure::failed(deep).to_string(),
+            "error: rendering stopped\n  caused by: frame_000001.exr: cannot be written: disk full"
+        );
+    }
+
+    #[test]
+    fn a_reader_that_left_is_told_from_other_faults() {
+        let left = Err::<(), _>(io::Error::from(io::ErrorKind::BrokenPipe)).context("writing to standard output").unwrap_err();
+        assert!(Failure::failed(left).is_broken_pipe());
+        assert!(!Failure::from(io::Error::from(io::ErrorKind::StorageFull)).is_broken_pipe());
+    }
+
+    #[test]
+    fn adapters_have_their_own_code() {
+        assert_eq!(Failure::from(GpuError::NoAdapter(String::new())).code(), NO_ADAPTER);
+        assert_eq!(Failure::from(GpuError::Device("lost".into())).code(), FAILED);
+    }
+}

@@ -1,0 +1,179 @@
+//! `--frames`: which frames of a sequence.
+
+use std::{fmt, str::FromStr};
+
+/// Ranges as typed; ends that were left out come from the sequence.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameList(Vec<Part>);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Part {
+    first: u64,
+    /// Exclusive.
+    end: Option<u64>,
+}
+
+/// Why `--frames` cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum FrameListError {
+    /// Not a list of ranges.
+    Syntax(String),
+    /// A range that holds nothing.
+    Empty(String),
+    /// A frame that the window does not have.
+    Outside {
+        /// The frame.
+        frame: u64,
+        /// How many there are.
+        frames: u64,
+    },
+}
+
+impl fmt::Display for FrameListError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Syntax(part) => {
+                write!(f, "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas")
+            }
+            Self::Empty(part) => write!(f, "`{part}` holds no frame: the end must be above the start"),
+            Self::Outside { frame, frames } => {
+                let last = frames.saturating_sub(1);
+                write!(
+                    f,
+                    "--frames asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for FrameListError {}
+
+impl FromStr for FrameList {
+    type Err = FrameListError;
+
+    fn from_str(text: &str) -> Result<Self, FrameListError> {
+        text.split(',').map(|part| Part::parse(part.trim())).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl Part {
+    fn parse(text: &str) -> Result<Self, FrameListError> {
+        let syntax = || FrameListError::Syntax(text.to_owned());
+        let number = |digits: &str| match digits.bytes().all(|byte| byte.is_ascii_digit()) {
+            true => digits.parse::<u64>().map_err(|_| syntax()),
+            false => Err(syntax()),
+        };
+        let part = match text.split_once("..") {
+            None => {
+                let first = number(text)?;
+                Self { first, end: Some(first.checked_add(1).ok_or_else(syntax)?) }
+            }
+            Some((first, end)) => Self {
+                first: if first.is_empty() { 0 } else { number(first)? },
+                end: match (end, end.strip_prefix('=')) {
+                    ("", _) => None,
+                    (_, Some(last)) => Some(number(last)?.checked_add(1).ok_or_else(syntax)?),
+                    (end, None) => Some(number(end)?),
+                },
+            },
+        };
+        if part.end.is_some_and(|end| end <= part.first) {
+            return Err(FrameListError::Empty(text.to_owned()));
+        }
+        Ok(part)
+    }
+}
+
+impl FrameList {
+    /// The frames in ascending order, each once, of a sequence that has `frames` of them.
+    ///
+    /// # Errors
+    /// [`FrameListError::Outside`].
+    pub fn resolve(&self, frames: u64) -> Result<Vec<u64>, FrameListError> {
+        let mut list = Vec::new();
+        for part in &self.0 {
+            let end = part.end.unwrap_or_else(|| frames.max(part.first + 1));
+            if end > frames {
+                return Err(FrameListError::Outside { frame: part.first.max(frames).min(end - 1), frames });
+            }
+            list.extend(part.first..end);
+        }
+        list.sort_unstable();
+        list.dedup();
+        Ok(list)
+    }
+}
+
+/// `--shard I/N`: every N-th frame, beginning with the I-th (counted from 1).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard(
+    /// I and N.
+    pub [u64; 2],
+);
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
+        match numbers {
+            Some((index, count)) if (1..=count).contains(&index) => Ok(Self([index, count])),
+            _ => Err("write I/N with I from 1 to N: 1/4 is the first of four shards".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.0[0], self.0[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn frames(text: &str, of: u64) -> Result<Vec<u64>, FrameListError> {
+        text.parse::<FrameList>()?.resolve(of)
+    }
+
+    #[test]
+    fn ranges_are_read_as_in_rust() {
+        assert_eq!(frames("2..5", 10), Ok(vec![2, 3, 4]));
+        assert_eq!(frames("2..=5", 10), Ok(vec![2, 3, 4, 5]));
+        assert_eq!(frames("7", 10), Ok(vec![7]));
+        assert_eq!(frames("8..", 10), Ok(vec![8, 9]));
+        assert_eq!(frames("..2", 10), Ok(vec![0, 1]));
+        assert_eq!(frames("5, 1..3, 2..4", 10), Ok(vec![1, 2, 3, 5]));
+    }
+
+    #[test]
+    fn what_is_no_range_is_refused() {
+        for text in ["", "a", "1..b", "-1", "1...3", "..=", "1,,2", "1..=18446744073709551615", "99999999999999999999", "+3"] {
+            assert!(matches!(text.parse::<FrameList>(), Err(FrameListError::Syntax(_))), "{text}");
+        }
+        for text in ["3..3", "5..2", "..0"] {
+            assert!(matches!(text.parse::<FrameList>(), Err(FrameListError::Empty(_))), "{text}");
+        }
+    }
+
+    #[test]
+    fn frames_outside_are_named() {
+        assert_eq!(frames("5..12", 10), Err(FrameListError::Outside { frame: 10, frames: 10 }));
+        assert_eq!(frames("20", 10), Err(FrameListError::Outside { frame: 20, frames: 10 }));
+        assert_eq!(frames("12..", 10), Err(FrameListError::Outside { frame: 12, frames: 10 }));
+        // A huge range is refused before it is listed.
+        assert_eq!(frames("0..18446744073709551615", 10), Err(FrameListError::Outside { frame: 10, frames: 10 }));
+    }
+
+    #[test]
+    fn shards_count_from_one() {
+        assert_eq!("2/3".parse(), Ok(Shard([2, 3])));
+        for text in ["0/3", "4/3", "1", "1/0", "a/b", "-1/3"] {
+            assert!(text.parse::<Shard>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What several commands take: a scenario with changes on top, and everything it names, loaded.
+
+use std::path::PathBuf;
+
+use camsim_core::scenario::{Preset, Scenario};
+use camsim_io::{
+    load::{Loaded, load_sequence},
+    scenario_file::read_scenario,
+};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+};
+
+/// A scenario file and what the command line changes of it.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ScenarioArgs {
+    /// Scenario (TOML); `camsim render --print-default` prints one with every key explained
+    pub scenario: PathBuf,
+    #[command(flatten)]
+    pub changes: Changes,
+}
+
+/// What the command line changes of a scenario.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Changes {
+    /// Change a key of the scenario: --set camera.shutter.readout_ms=0 (may be repeated)
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parse_set)]
+    pub sets: Vec<(String, String)>,
+    /// Methods: camsim's own, or the paper's
+    #[arg(long, value_enum)]
+    pub preset: Option<PresetArg>,
+}
+
+/// `--preset`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum PresetArg {
+    /// The cheapest methods that keep the tolerances
+    Default,
+    /// The paper's own methods and approximations
+    Paper,
+}
+
+fn parse_set(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err("write KEY=VALUE, such as camera.fps=25".to_owned()),
+    }
+}
+
+impl ScenarioArgs {
+    /// Reads the scenario and applies the changes.
+    pub fn read(&self) -> Result<Scenario, Failure> {
+        let preset = self.changes.preset.map(|preset| match preset {
+            PresetArg::Default => Preset::Default,
+            PresetArg::Paper => Preset::Paper,
+        });
+        read_scenario(&self.scenario, &self.changes.sets, preset).or_bad_input()
+    }
+}
+
+/// Loads what the scenario names; warnings are said once.
+pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Failure> {
+    let loaded = load_sequence(scenario).or_bad_input()?;
+    for warning in &loaded.warnings {
+        console.warn(warning);
+    }
+    console.detail(format_args!("{}: {}", scenario.flight.log.display(), loaded.log.report));
+    Ok(loaded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_split_at_the_first_equals_sign() {
+        assert_eq!(parse_set("a.b = c=d"), Ok(("a.b".to_owned(), "c=d".to_owned())));
+        assert_eq!(parse_set("a="), Ok(("a".to_owned(), String::new())));
+        assert!(parse_set("a").is_err());
+        assert!(parse_set("=1").is_err());
+    }
+}

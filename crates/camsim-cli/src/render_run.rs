@@ -1,0 +1,170 @@
+//! A sequence through the engine into an output folder.
+
+use std::{
+    path::Path,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use camsim_core::{plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
+use camsim_gpu::{Engine, engine::Finished};
+use camsim_io::{
+    manifest::{ResumeError, RunManifest, check_resume, in_shard},
+    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
+};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    frame_list::Shard,
+    progress::frames_bar,
+};
+
+/// What to render and where to.
+#[derive(Debug)]
+pub struct Job<'a> {
+    /// The loaded sequence.
+    pub sequence: &'a Arc<Sequence>,
+    /// Output folder.
+    pub folder: &'a Path,
+    /// Frames of all shards, ascending.
+    pub frames: &'a [u64],
+    /// Which of them are this run's.
+    pub shard: Option<Shard>,
+    /// Whether frames that are there already stay.
+    pub resume: bool,
+    /// Said while loading; kept in `run.json`.
+    pub warnings: &'a [String],
+}
+
+/// What a run did.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// Frames rendered.
+    pub frames: u64,
+    /// Frames that were there already.
+    pub skipped: u64,
+    /// Bytes of frame files.
+    pub bytes: u64,
+    /// From the first submission until the last file was written.
+    pub time: Duration,
+}
+
+impl Outcome {
+    /// Frames a second; 0 if there was nothing to do.
+    #[must_use]
+    pub fn frames_per_s(&self) -> f64 {
+        if self.frames == 0 { 0.0 } else { self.frames as f64 / self.time.as_secs_f64().max(1e-9) }
+    }
+}
+
+/// Renders; `look` sees each finished frame before it is written.
+pub fn run(job: &Job<'_>, engine: &Engine, console: &mut Console<'_>, look: &mut dyn FnMut(&Finished)) -> Result<Outcome, Failure> {
+    let scenario = &job.sequence.scenario;
+    let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
+    check_folder(job, console)?;
+    let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
+    let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
+    let mut session = engine.session::<WriteError>(job.sequence.clone(), &scenario.output.channels)?;
+    let mut manifest = RunManifest {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        adapter: engine.gpu().adapter.to_string(),
+        seed: scenario.seed,
+        scenario: scenario.clone(),
+        frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
+        shard: job.shard.map(|shard| shard.0),
+        written: 0,
+        skipped: (mine.len() - todo.len()) as u64,
+        finished: false,
+        warnings: job.warnings.to_vec(),
+    };
+    manifest.write(job.folder).or_failed()?;
+    write_tables(job, &files, session.planner())?;
+
+    let writes_frames = !scenario.output.format.is_empty();
+    let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
+    let bar = frames_bar(todo.len() as u64, console.is_quiet());
+    let begin = Instant::now();
+    let rendered = session.render(todo.iter().copied(), &mut |finished| {
+        look(&finished);
+        bar.inc(1);
+        writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
+    });
+    bar.finish_and_clear();
+    rendered?;
+    let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);
+    let time = begin.elapsed();
+
+    manifest.written = todo.len() as u64;
+    manifest.finished = true;
+    manifest.write(job.folder).or_failed()?;
+    Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time })
+}
+
+/// Frames of another scenario are never taken for this one's; without `--resume` they are only worth a warning.
+fn check_folder(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
+    match check_resume(job.folder, &job.sequence.scenario) {
+        Err(error) if job.resume => Err(Failure::bad_input(error)),
+        Err(ResumeError::Differs { path, .. }) => {
+            console.warn(format_args!("{} is of another scenario: files of the same name are replaced, others stay", path.display()));
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `camera.toml`, `trajectory.csv` and `frames.csv`.
+fn write_tables(job: &Job<'_>, files: &FrameFiles, planner: &Planner) -> Result<(), Failure> {
+    let sequence = job.sequence;
+    let camera = camera_toml(&sequence.scenario.camera).or_failed()?;
+    write_atomic(&job.folder.join("camera.toml"), camera.as_bytes()).or_failed()?;
+    let trajectory = trajectory_csv(trajectory_records(sequence, planner).or_bad_input()?);
+    write_atomic(&job.folder.join("trajectory.csv"), trajectory.as_bytes()).or_failed()?;
+    // A resumed folder may hold frames beyond those asked for now.
+    let kept = (0..sequence.frames).filter(|&frame| job.frames.binary_search(&frame).is_ok() || (job.resume && files.exist(frame)));
+    let records: Vec<FrameRecord> = kept.map(|frame| frame_record(sequence, files, planner, frame)).collect();
+    write_atomic(&job.folder.join("frames.csv"), frames_csv(&records).as_bytes()).or_failed()
+}
+
+fn frame_record(sequence: &Sequence, files: &FrameFiles, planner: &Planner, frame: u64) -> FrameRecord {
+    let stamp_s = planner.stamp_s(frame);
+    let pose = sequence.path.pose(stamp_s);
+    FrameRecord {
+        frame,
+        stamp_ns: log_ns(sequence.epoch_ns, stamp_s),
+        position_ned_m: pose.position_ned_m,
+        ned_from_camera: pose.ned_from_camera,
+        files: files.names(frame),
+    }
+}
+
+/// The motion at control ticks, from the first to the last instant that any frame sees.
+fn trajectory_records(
+    sequence: &Sequence,
+    planner: &Planner,
+) -> Result<impl Iterator<Item = TrajectoryRecord>, camsim_core::shutter::ShutterError> {
+    let Scenario { camera, tracker, .. } = &sequence.scenario;
+    let (first_s, last_s) = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?.window_s();
+    let seen_s = [planner.stamp_s(0) + first_s, planner.stamp_s(sequence.frames - 1) + last_s];
+    Ok(motion(&sequence.path.trajectory, sequence.epoch_ns, tracker.rate_hz, seen_s))
+}
+
+/// States at `start + k / rate_hz` that enclose `seen_s`; outside of the log the platform coasts.
+pub fn motion(trajectory: &Trajectory, epoch_ns: i64, rate_hz: f64, seen_s: [f64; 2]) -> impl Iterator<Item = TrajectoryRecord> + use<'_> {
+    let start_s = trajectory.span_s().0;
+    let tick = |t_s: f64| (t_s - start_s) * rate_hz;
+    let (first, last) = ((tick(seen_s[0]) + 1e-6).floor() as i64, (tick(seen_s[1]) - 1e-6).ceil() as i64);
+    (first..=last).map(move |k| {
+        let t_s = start_s + k as f64 / rate_hz;
+        TrajectoryRecord { t_ns: log_ns(epoch_ns, t_s), state: trajectory.state(t_s) }
+    })
+}
+
+/// Path time to the log's clock, nanoseconds.
+fn log_ns(epoch_ns: i64, t_s: f64) -> i64 {
+    epoch_ns.saturating_add((t_s * 1e9).round() as i64)
+}
+
+fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
