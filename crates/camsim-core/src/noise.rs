@@ -107,7 +107,9 @@ mod tests {
 
     #[test]
     fn quantiles_agree_with_published_values() {
-        for (p, z) in [(0.25, 0.674_489_750_196_082), (0.025, 1.959_963_984_540_054), (1e-3, 3.090_232_306_167_813), (1e-6, 4.753_424_308_822_899)] {
+        for (p, z) in
+            [(0.25, 0.674_489_750_196_082), (0.025, 1.959_963_984_540_054), (1e-3, 3.090_232_306_167_813), (1e-6, 4.753_424_308_822_899)]
+        {
             assert!((upper_quantile(p) - z).abs() < 1e-9, "{p}: {}", upper_quantile(p));
         }
     }
@@ -127,7 +129,10 @@ mod tests {
         }
         let moment = sums.map(|s| s / f64::from(n));
         // Five standard errors of each estimate at n = 1e6.
-        assert!(moment[0].abs() < 5e-3 && (moment[1] - 1.0).abs() < 7.1e-3 && moment[2].abs() < 0.02 && (moment[3] - 3.0).abs() < 0.05, "{moment:?}");
+        assert!(
+            moment[0].abs() < 5e-3 && (moment[1] - 1.0).abs() < 7.1e-3 && moment[2].abs() < 0.02 && (moment[3] - 3.0).abs() < 0.05,
+            "{moment:?}"
+        );
         assert!((f64::from(beyond_3) / f64::from(n) - 0.002_7).abs() < 2.6e-4, "{beyond_3}");
     }
 

@@ -49,7 +49,15 @@ pub fn is_mono(output: OutputEncoding) -> bool {
 
 /// Final linear value of a pixel: `clamp(color * weight * light + sigma * n, 0, 1)`.
 #[must_use]
-pub fn photometric(spec: &PhotometricSpec, color: [f32; 3], weight: f32, pixel: [u32; 2], frame: u32, seed: u64, table: &[f32]) -> [f32; 3] {
+pub fn photometric(
+    spec: &PhotometricSpec,
+    color: [f32; 3],
+    weight: f32,
+    pixel: [u32; 2],
+    frame: u32,
+    seed: u64,
+    table: &[f32],
+) -> [f32; 3] {
     let mono = is_mono(spec.output);
     let luma = 0.212_6 * color[0] + 0.715_2 * color[1] + 0.072_2 * color[2];
     let gain = weight * spec.light as f32;

@@ -42,7 +42,9 @@ pub enum PlanError {
     #[error(transparent)]
     Shutter(#[from] ShutterError),
     /// No pixel has a pre-image.
-    #[error("no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)")]
+    #[error(
+        "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
+    )]
     NoRay,
     /// The ideal frame would be too large.
     #[error(

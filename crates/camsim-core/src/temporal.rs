@@ -82,7 +82,13 @@ pub struct Source {
 /// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key frame's inverse depth w_key
 /// there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the error by `(parallax px) |grad w| / w`.
 #[must_use]
-pub fn reproject(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, depth: &InverseDepthImage<'_>, ideal: &IdealGeometry) -> Option<Source> {
+pub fn reproject(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    iterations: u32,
+    depth: &InverseDepthImage<'_>,
+    ideal: &IdealGeometry,
+) -> Option<Source> {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
     let mut w = 0.0;

@@ -90,7 +90,11 @@ impl Engine {
     ///
     /// # Errors
     /// What the adapter cannot hold, a camera that cannot be used.
-    pub fn session<E: std::error::Error + 'static>(&self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<Session<'_>, RenderError<E>> {
+    pub fn session<E: std::error::Error + 'static>(
+        &self,
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+    ) -> Result<Session<'_>, RenderError<E>> {
         let gpu = &self.gpu;
         let planner = Planner::new(sequence.clone(), channels, gpu.max_side_px())?;
         let pixels = u64::from(sequence.scenario.camera.size_px[0]) * u64::from(sequence.scenario.camera.size_px[1]);
@@ -468,7 +472,13 @@ fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
         .collect()
 }
 
-fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32, aspect: wgpu::TextureAspect) -> Result<Vec<T>, GpuError> {
+fn read_texture<T: bytemuck::Pod>(
+    gpu: &GpuContext,
+    texture: &wgpu::Texture,
+    width: u32,
+    height: u32,
+    aspect: wgpu::TextureAspect,
+) -> Result<Vec<T>, GpuError> {
     let row = width * size_of::<T>() as u32;
     let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     // Depth can only be copied whole.

@@ -107,17 +107,61 @@ mod tests {
         let parse = |text: String| naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{}", e.emit_to_string(&text)));
         let key = *reverse::PipelineKey::all().last().unwrap();
         let module = parse(shaders::compose(reverse::SHADER, &key.slots()).unwrap());
-        assert_mirror!(&module, "Frame", FrameUniforms, [
-            size_px, ideal_size_px, ideal_focal_px, ideal_principal_px, focal_px, principal_px, near_m, nodes, line_axis, lines, fields,
-            iterations, samples_per_px, max_samples, max_taps, coords_phase, light, noise_sigma, vignette_thresholds, seed, frame_number,
-            mono, exposure_travel_px_m, pad0, key_position_ned_m, ned_from_key_x, ned_from_key_y, ned_from_key_z,
-        ]);
+        assert_mirror!(
+            &module,
+            "Frame",
+            FrameUniforms,
+            [
+                size_px,
+                ideal_size_px,
+                ideal_focal_px,
+                ideal_principal_px,
+                focal_px,
+                principal_px,
+                near_m,
+                nodes,
+                line_axis,
+                lines,
+                fields,
+                iterations,
+                samples_per_px,
+                max_samples,
+                max_taps,
+                coords_phase,
+                light,
+                noise_sigma,
+                vignette_thresholds,
+                seed,
+                frame_number,
+                mono,
+                exposure_travel_px_m,
+                pad0,
+                key_position_ned_m,
+                ned_from_key_x,
+                ned_from_key_y,
+                ned_from_key_z,
+            ]
+        );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
         let module = parse(shaders::compose("ideal/terrain.wgsl", &[]).unwrap());
-        assert_mirror!(&module, "IdealCamera", IdealCamera, [
-            clip_scale, clip_shift, camera_from_ned_x, camera_from_ned_y, camera_from_ned_z, camera_from_base_m, sky, near_m, pad0, pad1,
-            pad2,
-        ]);
+        assert_mirror!(
+            &module,
+            "IdealCamera",
+            IdealCamera,
+            [
+                clip_scale,
+                clip_shift,
+                camera_from_ned_x,
+                camera_from_ned_y,
+                camera_from_ned_z,
+                camera_from_base_m,
+                sky,
+                near_m,
+                pad0,
+                pad1,
+                pad2,
+            ]
+        );
         assert_mirror!(&module, "ChunkDraw", ChunkDraw, [centre_from_base_m, first_vertex, cells, levels, pad]);
     }
 }

@@ -230,7 +230,8 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
-    let texture = |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
+    let texture =
+        |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
     let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, storage(true))];
     let ideal = vec![
         entry(0, texture(wgpu::TextureSampleType::Float { filterable: true })),

@@ -107,7 +107,10 @@ fn read(file: &str) -> Result<Cow<'static, str>, ComposeError> {
             .map(Cow::Owned)
             .map_err(|_| ComposeError::Missing(file.to_owned()));
     }
-    FILES.iter().find_map(|(name, text)| (*name == file).then_some(Cow::Borrowed(*text))).ok_or_else(|| ComposeError::Missing(file.to_owned()))
+    FILES
+        .iter()
+        .find_map(|(name, text)| (*name == file).then_some(Cow::Borrowed(*text)))
+        .ok_or_else(|| ComposeError::Missing(file.to_owned()))
 }
 
 /// A shader module from a composed file.

@@ -104,7 +104,11 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             let Some(nodes) = (0..blur.nodes).map(|node| solve(node).map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
             let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.max_taps);
             let expected = gather(&nodes, &area, &color, blur.samples_per_px, blur.max_samples);
-            let found = DVec3::new(f64::from(done.frame.color_rgba[4 * i]), f64::from(done.frame.color_rgba[4 * i + 1]), f64::from(done.frame.color_rgba[4 * i + 2]));
+            let found = DVec3::new(
+                f64::from(done.frame.color_rgba[4 * i]),
+                f64::from(done.frame.color_rgba[4 * i + 1]),
+                f64::from(done.frame.color_rgba[4 * i + 2]),
+            );
             compared += 1;
             // Where a path length sits on a sample-count boundary, f32 may take one sample more: such pixels differ a little, and are few.
             differing += u32::from((found - expected).abs().max_element() > 1e-3);
@@ -171,7 +175,9 @@ fn bytes_are_the_same_twice_and_in_any_order() {
     let all = |order: &[u64]| {
         let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
         let mut frames = Vec::new();
-        session.render::<Infallible>(order.iter().copied(), &mut |f| Ok(frames.push((f.frame.index, f.frame.color_rgba, f.frame.coords)))).expect("render");
+        session
+            .render::<Infallible>(order.iter().copied(), &mut |f| Ok(frames.push((f.frame.index, f.frame.color_rgba, f.frame.coords))))
+            .expect("render");
         frames.sort_by_key(|f| f.0);
         frames
     };

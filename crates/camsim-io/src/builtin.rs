@@ -1,9 +1,8 @@
 //! The flight that ships inside the program: log, terrain, picture, camera, scenario (see `assets/README.md` for their licences).
 
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
+
+use crate::write::{WriteError, write_atomic};
 
 macro_rules! embedded {
     ($($name:literal),* $(,)?) => {
@@ -26,17 +25,14 @@ embedded![
 /// Writes the built-in scene to a folder (files that are there already with the same content stay) and gives the path of `demo.toml`.
 ///
 /// # Errors
-/// What the file system says.
-pub fn unpack(folder: &Path) -> io::Result<PathBuf> {
-    std::fs::create_dir_all(folder)?;
+/// [`WriteError`] names the file.
+pub fn unpack(folder: &Path) -> Result<PathBuf, WriteError> {
     for (name, bytes) in FILES {
         let path = folder.join(name);
         if std::fs::read(&path).is_ok_and(|there| there == *bytes) {
             continue;
         }
-        let partial = folder.join(format!(".{name}.partial"));
-        std::fs::write(&partial, bytes)?;
-        std::fs::rename(&partial, &path)?;
+        write_atomic(&path, bytes)?;
     }
     Ok(folder.join("demo.toml"))
 }

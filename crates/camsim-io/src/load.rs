@@ -46,9 +46,7 @@ pub enum LoadError {
         log: PathBuf,
     },
     /// No frame falls into the window.
-    #[error(
-        "flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher"
-    )]
+    #[error("flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher")]
     NoFrame(f64, f64, f64),
     /// The zoom track.
     #[error("{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` and rows of finite numbers by ascending time")]
@@ -214,7 +212,8 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
     }
     if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
         let step = (sequence.frames / 200).max(1);
-        let places = (0..sequence.frames).step_by(step as usize).map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
+        let places =
+            (0..sequence.frames).step_by(step as usize).map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
         let (mut over, mut below, mut all) = (0, 0, 0);
         for place in places {
             all += 1;
@@ -227,7 +226,9 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
         if over == 0 {
             warnings.push(format!("the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} deg"));
         } else if below > 0 {
-            warnings.push(format!("the camera is below the ground in {below} of {all} places looked at: check flight.height and scene.terrain.height"));
+            warnings.push(format!(
+                "the camera is below the ground in {below} of {all} places looked at: check flight.height and scene.terrain.height"
+            ));
         }
     }
     warnings

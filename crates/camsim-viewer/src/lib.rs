@@ -29,6 +29,7 @@ pub fn run(scenario: Option<PathBuf>) -> anyhow::Result<()> {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    eframe::run_native("camsim", options, Box::new(move |creation| Ok(Box::new(app::Viewer::new(&creation.egui_ctx, path)))))
-        .map_err(|error| anyhow!("the viewer's window cannot be opened: {error}; it needs a display (on a remote machine use `camsim render`)"))
+    eframe::run_native("camsim", options, Box::new(move |creation| Ok(Box::new(app::Viewer::new(&creation.egui_ctx, path))))).map_err(
+        |error| anyhow!("the viewer's window cannot be opened: {error}; it needs a display (on a remote machine use `camsim render`)"),
+    )
 }

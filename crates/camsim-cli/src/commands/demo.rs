@@ -1,13 +1,13 @@
 //! `camsim demo`: pictures without a scenario of one's own.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+use std::{path::PathBuf, sync::Arc};
 
 use camsim_core::{frame::RenderedFrame, mount::CameraPath, scenario::LensSpec, sequence::Sequence};
 use camsim_gpu::{AdapterChoice, Engine};
-use camsim_io::write::{WriteError, contact_sheet, write_atomic};
+use camsim_io::{
+    builtin,
+    write::{WriteError, contact_sheet},
+};
 
 use crate::{
     console::Console,
@@ -23,24 +23,6 @@ const SHEET_FRAMES: usize = 12;
 const SHEET_COLUMNS: u32 = 4;
 /// Thumbnails are smaller by this factor.
 const SHEET_SHRINK: u32 = 2;
-
-/// The built-in scene lies in the program, so that the program alone suffices.
-macro_rules! assets {
-    ($($name:literal),*) => {
-        [$(($name, include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/", $name)).as_slice())),*]
-    };
-}
-
-const ASSETS: [(&str, &[u8]); 8] = assets![
-    "demo.toml",
-    "demo_camera.toml",
-    "demo_flight.csv",
-    "demo_dem.tif",
-    "demo_ortho.jpg",
-    "vignette.png",
-    "pattern.toml",
-    "acircles.png"
-];
 
 /// Render the built-in flight: nothing to prepare
 ///
@@ -58,7 +40,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     // The adapter first: without one there is no need to read anything.
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
-    let scene = unpack(folder)?;
+    let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
     let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read()?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
@@ -91,15 +73,6 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     console.line(format_args!("  camsim render {} -o all --set camera.shutter.readout_ms=0", scene.display()))?;
     console.line(format_args!("  camsim viewer {}", scene.display()))?;
     Ok(())
-}
-
-/// Puts the built-in scene into `folder/scene` and gives its scenario.
-fn unpack(folder: &Path) -> Result<PathBuf, Failure> {
-    let scene = folder.join("scene");
-    for (name, bytes) in ASSETS {
-        write_atomic(&scene.join(name), bytes).or_failed()?;
-    }
-    Ok(scene.join("demo.toml"))
 }
 
 /// The same flight through a pinhole with an instant global shutter on a still mount, without noise and vignette.

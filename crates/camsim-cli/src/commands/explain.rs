@@ -1,7 +1,8 @@
 //! `camsim explain`: what one frame takes, without rendering it.
 
 use camsim_core::{
-    plan::{PlanSummary, Planner},
+    plan::{FramePlan, PlanSummary, Planner},
+    scene::select_lod,
     tracker::{ResolvedLimits, Saturation},
 };
 use camsim_io::{load::Loaded, terrain::TerrainSummary};
@@ -39,6 +40,7 @@ struct Explained<'a> {
     terrain: Option<Terrain>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
+    level_of_detail: Option<LevelOfDetail>,
 }
 
 #[derive(Serialize)]
@@ -54,6 +56,14 @@ struct Tracker {
     rate_hz: f64,
     limits: ResolvedLimits,
     saturation: Saturation,
+}
+
+/// What the ideal frame draws of the terrain.
+#[derive(Serialize)]
+struct LevelOfDetail {
+    triangles: u64,
+    max_error_px: f64,
+    tolerance_px: f64,
 }
 
 #[derive(Serialize)]
@@ -79,14 +89,16 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
+    let level_of_detail = level_of_detail(&loaded, &plan);
     let tracked = &loaded.tracked;
     let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
-        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings: &loaded.warnings, plan: plan.summary() })?);
+        let warnings = &loaded.warnings;
+        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings, plan: plan.summary(), level_of_detail })?);
     }
     let [first_s, last_s] = log.span_s;
     console.line(format_args!("log {}", log.file))?;
-    console.line(format_args!("  {} rows from {first_s:.3} to {last_s:.3} s, {}", log.rows, log.cleaning))?;
+    console.line(format_args!("  {} rows from {first_s:.3} to {last_s:.3} s; cleaning: {}", log.rows, log.cleaning))?;
     console.line(format_args!("tracker at {} Hz", tracker.rate_hz))?;
     let limits = tracker.limits;
     console.line(format_args!("  at most {:.3} m/s, {:.3} m/s^2", limits.max_speed_m_s, limits.max_acceleration_m_s2))?;
@@ -97,7 +109,19 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
+    if let Some(LevelOfDetail { triangles, max_error_px, tolerance_px }) = level_of_detail {
+        console.line("terrain in this frame")?;
+        console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;
+    }
     Ok(())
+}
+
+/// The choice that the ideal pass makes.
+fn level_of_detail(loaded: &Loaded, plan: &FramePlan) -> Option<LevelOfDetail> {
+    let terrain = loaded.sequence.scene.terrain.as_ref()?;
+    let tolerance_px = loaded.sequence.scenario.quality.max_terrain_error_px;
+    let lod = select_lod(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
+    Some(LevelOfDetail { triangles: lod.triangles, max_error_px: lod.max_error_px, tolerance_px })
 }
 
 fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Failure> {

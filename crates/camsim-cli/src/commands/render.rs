@@ -119,7 +119,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if !console.is_quiet() {
         let kept = if outcome.skipped > 0 { format!(" ({} were there already)", outcome.skipped) } else { String::new() };
         let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
-        console.line(format_args!("{} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))?;
+        let size_mb = outcome.bytes as f64 * 1e-6;
+        let (frames, folder) = (outcome.frames, folder.display());
+        console.line(format_args!("{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"))?;
     }
     Ok(())
 }

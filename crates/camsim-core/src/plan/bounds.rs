@@ -75,7 +75,9 @@ fn band_of(pixel: [u32; 2], size_px: [u32; 2]) -> u32 {
 /// Valid pixels on a coarse grid that includes the borders, and every pixel of cells that the edge of validity crosses.
 fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
     let [width, height] = camera.size_px;
-    let ticks = |size: u32| (0..size).step_by(STEP_PX as usize).chain((!(size - 1).is_multiple_of(STEP_PX)).then_some(size - 1)).collect::<Vec<u32>>();
+    let ticks = |size: u32| {
+        (0..size).step_by(STEP_PX as usize).chain((!(size - 1).is_multiple_of(STEP_PX)).then_some(size - 1)).collect::<Vec<u32>>()
+    };
     let ray = |x: u32, y: u32| camera.unproject(DVec2::new(f64::from(x), f64::from(y)));
     let (xs, ys) = (ticks(width), ticks(height));
     use rayon::prelude::*;
@@ -96,7 +98,14 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
 
 /// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
 /// exposure), at infinity and at the nearest depth in view.
-pub(super) fn ideal_geometry(reach: &LensReach, path: &CameraPath, shutter: &Shutter, stamp_s: f64, key_s: f64, scene: &Scene) -> IdealGeometry {
+pub(super) fn ideal_geometry(
+    reach: &LensReach,
+    path: &CameraPath,
+    shutter: &Shutter,
+    stamp_s: f64,
+    key_s: f64,
+    scene: &Scene,
+) -> IdealGeometry {
     let key = path.pose(key_s);
     // A lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory is not worth it.
     let focal_px = reach.camera.focal_px * (1.0 / reach.least_stretch).clamp(1.0, 2.0);

@@ -107,7 +107,11 @@ impl fmt::Display for FramePlan {
             writeln!(f, "  zoom {zoom}")?;
         }
         writeln!(f, "motion within the frame")?;
-        writeln!(f, "  travel {travel_m:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away", rotation_rad.to_degrees())?;
+        writeln!(
+            f,
+            "  travel {travel_m:.4} m, rotation {:.4} deg, nearest surface at least {nearest_m:.1} m away",
+            rotation_rad.to_degrees()
+        )?;
         writeln!(f, "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)")?;
         writeln!(f, "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px")?;
         writeln!(f, "passes")?;

@@ -3,13 +3,7 @@
 use glam::DVec2;
 
 use super::{BlurStage, LensReach, Motion, Skip, TemporalStage};
-use crate::{
-    mount::CameraPath,
-    scenario::QualitySpec,
-    scene::Scene,
-    shutter::Shutter,
-    temporal::IdealGeometry,
-};
+use crate::{mount::CameraPath, scenario::QualitySpec, scene::Scene, shutter::Shutter, temporal::IdealGeometry};
 
 /// Part of the tolerance that a left-out effect may use up.
 const NEGLIGIBLE: f64 = 0.2;
@@ -26,12 +20,21 @@ pub(super) fn instants(path: &CameraPath, window_s: [f64; 2]) -> impl Iterator<I
 }
 
 /// Bounds on the frame's motion.
-pub(super) fn measure(reach: &LensReach, path: &CameraPath, shutter: &Shutter, stamp_s: f64, key_s: f64, ideal: &IdealGeometry, scene: &Scene) -> Motion {
+pub(super) fn measure(
+    reach: &LensReach,
+    path: &CameraPath,
+    shutter: &Shutter,
+    stamp_s: f64,
+    key_s: f64,
+    ideal: &IdealGeometry,
+    scene: &Scene,
+) -> Motion {
     let key = path.pose(key_s);
     let (first, last) = shutter.window_s();
     let window_s = [stamp_s + first, stamp_s + last];
     let travel_m = super::travel_m(path, window_s, key_s);
-    let rotation_rad = instants(path, window_s).map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera)).fold(0.0, f64::max);
+    let rotation_rad =
+        instants(path, window_s).map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera)).fold(0.0, f64::max);
     let nearest_m = super::nearest_m(scene, &key, ideal.tangents(), travel_m);
     let slant = reach.slant();
     let focal_px = ideal.focal_px.max_element();
@@ -51,7 +54,14 @@ pub(super) fn measure(reach: &LensReach, path: &CameraPath, shutter: &Shutter, s
 }
 
 /// Longest path over the exposure, and the largest miss of its chord, over a few lines, rays and both depth extremes.
-fn blur_path(reach: &LensReach, path: &CameraPath, shutter: &Shutter, stamp_s: f64, ideal: &IdealGeometry, inverse_near: f64) -> (f64, f64) {
+fn blur_path(
+    reach: &LensReach,
+    path: &CameraPath,
+    shutter: &Shutter,
+    stamp_s: f64,
+    ideal: &IdealGeometry,
+    inverse_near: f64,
+) -> (f64, f64) {
     let exposure_s = shutter.exposure_s();
     if exposure_s <= 0.0 {
         return (0.0, 0.0);
@@ -88,11 +98,17 @@ pub(super) fn temporal_stage(motion: &Motion, quality: &QualitySpec, focal_px: f
     if motion.parallax_px > negligible_px {
         return TemporalStage::Reproject { iterations: iterations(motion.parallax_px, focal_px, negligible_px) };
     }
-    skipped.push(Skip { what: "depth in the temporal inverse", reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px) });
+    skipped.push(Skip {
+        what: "depth in the temporal inverse",
+        reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px),
+    });
     if motion.rotation_px > negligible_px {
         return TemporalStage::Rotation;
     }
-    skipped.push(Skip { what: "temporal inverse", reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px) });
+    skipped.push(Skip {
+        what: "temporal inverse",
+        reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
+    });
     TemporalStage::Identity
 }
 
@@ -104,7 +120,13 @@ fn iterations(parallax_px: f64, focal_px: f64, negligible_px: f64) -> u32 {
 }
 
 /// Nodes and samples of the exposure, or `None` when it does not show.
-pub(super) fn blur_stage(motion: &Motion, quality: &QualitySpec, path: &CameraPath, shutter: &Shutter, skipped: &mut Vec<Skip>) -> Option<BlurStage> {
+pub(super) fn blur_stage(
+    motion: &Motion,
+    quality: &QualitySpec,
+    path: &CameraPath,
+    shutter: &Shutter,
+    skipped: &mut Vec<Skip>,
+) -> Option<BlurStage> {
     if shutter.exposure_s() <= 0.0 {
         skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
         return None;

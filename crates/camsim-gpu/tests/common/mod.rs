@@ -70,7 +70,8 @@ pub fn steady(height_m: f64, yaw_deg: f64, velocity_ned_m_s: DVec3, rate_body_ra
 pub fn pattern(width_m: f64) -> Scene {
     const SIDE: u32 = 512;
     let level = |x: u32, y: u32, k: f64, phase: f64| {
-        let s = (std::f64::consts::TAU * k * f64::from(x) / f64::from(SIDE) + phase).sin() * (std::f64::consts::TAU * k * f64::from(y) / f64::from(SIDE)).cos();
+        let s = (std::f64::consts::TAU * k * f64::from(x) / f64::from(SIDE) + phase).sin()
+            * (std::f64::consts::TAU * k * f64::from(y) / f64::from(SIDE)).cos();
         (127.5 + 110.0 * s).round() as u8
     };
     let rgba8 = (0..SIDE * SIDE).flat_map(|i| {
@@ -78,11 +79,7 @@ pub fn pattern(width_m: f64) -> Scene {
         [level(x, y, 8.0, 0.0), level(x, y, 5.0, 1.0), level(x, y, 11.0, 2.0), 255]
     });
     let texture = Texture { size_px: [SIDE, SIDE], rgba8: rgba8.collect(), encoding: Encoding::Linear };
-    Scene {
-        meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)],
-        sky_linear: [0.2, 0.4, 0.8],
-        ..Scene::default()
-    }
+    Scene { meshes: vec![Mesh::level_picture(Arc::new(texture), DVec3::ZERO, width_m)], sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }
 }
 
 /// A sequence whose frame 0 has its stamp at t = 0.

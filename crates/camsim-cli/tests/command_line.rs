@@ -1,0 +1,236 @@
+//! The command line as a user meets it: what is typed, what is answered, and the exit code.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    ffi::OsString,
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Exit code, standard output, standard error.
+fn camsim<S: Into<OsString>>(args: impl IntoIterator<Item = S>) -> (u8, String, String) {
+    let (mut out, mut err) = (Vec::new(), Vec::new());
+    let args = std::iter::once(OsString::from("camsim")).chain(args.into_iter().map(Into::into));
+    let code = camsim_cli::run(args, &mut out, &mut err);
+    (code, String::from_utf8(out).unwrap(), String::from_utf8(err).unwrap())
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn assets() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets")
+}
+
+#[test]
+fn help_names_every_command_and_every_exit_code() {
+    let (code, out, err) = camsim(["--help"]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    for word in
+        ["demo", "render", "explain", "track", "lens", "camera", "compare", "info", "viewer", "completions", "Exit codes", "CAMSIM_ADAPTER"]
+    {
+        assert!(out.contains(word), "{word} is missing in\n{out}");
+    }
+    for command in ["demo", "render", "explain", "track", "lens", "camera", "compare", "info", "viewer", "completions"] {
+        let (code, out, _) = camsim([command, "--help"]);
+        assert_eq!(code, 0, "{command}");
+        assert!(out.contains("Usage: camsim"), "{out}");
+    }
+    assert_eq!(camsim(["--version"]).0, 0);
+}
+
+#[test]
+fn completions_come_for_every_shell() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let (code, out, _) = camsim(["completions", shell]);
+        assert!(code == 0 && out.contains("camsim") && out.contains("render"), "{shell}");
+    }
+}
+
+#[test]
+fn points_survive_the_lens_and_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let (rays, pixels, back) = (folder.path().join("rays.csv"), folder.path().join("pixels.csv"), folder.path().join("back.csv"));
+    let points = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [1e-9, 0.1]];
+    let rows: String = points.iter().map(|[u, v]| format!("{u},{v}\n")).collect();
+    fs::write(&rays, format!("u,v\n{rows}")).unwrap();
+    // The camera file by itself and inside its scenario are one camera.
+    for camera in ["demo_camera.toml", "demo.toml"] {
+        let camera = assets().join(camera);
+        let (code, _, err) = camsim(["lens", text(&camera), "distort", "--points", text(&rays), "-o", text(&pixels)]);
+        assert_eq!((code, err.as_str()), (0, ""));
+        let (code, _, err) = camsim(["lens", text(&camera), "undistort", "--points", text(&pixels), "-o", text(&back)]);
+        assert_eq!((code, err.as_str()), (0, ""));
+        let answer = fs::read_to_string(&back).unwrap();
+        let mut lines = answer.lines();
+        assert_eq!(lines.next(), Some("u,v,valid"));
+        for ([u, v], line) in points.iter().zip(lines) {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+            // Newton stops at 1e-13 of the ideal plane or better; the text keeps every bit.
+            assert!((cells[0] - u).abs() < 1e-11 && (cells[1] - v).abs() < 1e-11 && cells[2] == 1.0, "{line}");
+        }
+    }
+}
+
+#[test]
+fn pixels_without_a_ray_have_no_answer_and_rays_beyond_the_fold_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let camera = folder.path().join("folds.toml");
+    // d_r = 1 - 0.4 r^2 turns round at r = sqrt(1 / 1.2) = 0.913, where the image radius is 0.609.
+    let lens = "[lens]\nmodel = \"brown-conrady\"\ncoefficients = [-0.4]\n";
+    fs::write(&camera, format!("size_px = [640, 480]\nfocal_px = [400.0, 400.0]\n{lens}")).unwrap();
+    let points = folder.path().join("points.csv");
+    fs::write(&points, "x_px,y_px\n0,0\n319.5,239.5\n").unwrap();
+    let (code, out, _) = camsim(["lens", text(&camera), "undistort", "--points", text(&points)]);
+    assert_eq!((code, out.as_str()), (0, "u,v,valid\nNaN,NaN,0\n0.0,0.0,1\n"));
+    fs::write(&points, "u,v\n1.5,0\n0.1,0\n").unwrap();
+    let (code, out, err) = camsim(["lens", text(&camera), "distort", "--points", text(&points)]);
+    assert!(code == 0 && out.starts_with("x_px,y_px\n") && err.contains("1 of 2 points"), "{out}{err}");
+    assert_eq!(camsim(["-q", "lens", text(&camera), "distort", "--points", text(&points)]).2, "");
+
+    let (code, out, _) = camsim(["lens", text(&camera), "check", "--json"]);
+    let check: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, 0);
+    assert!((check["fold_radius_min"].as_f64().unwrap() - (1.0f64 / 1.2).sqrt()).abs() < 1e-6, "{check}");
+    assert!(check["valid_fraction"].as_f64().unwrap() < 1.0 && check["bijective"] == true && check["worst_roundtrip_px"].is_f64());
+}
+
+#[test]
+fn calibrations_of_other_programs_become_camera_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let (kalibr, camera) = (folder.path().join("camchain.yaml"), folder.path().join("CAMERA.toml"));
+    let chain = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]\n  distortion_model: radtan\n  \
+                 intrinsics: [458.6, 457.3, 367.2, 248.4]\n  resolution: [752, 480]\n";
+    fs::write(&kalibr, chain).unwrap();
+    let (code, _, err) = camsim(["camera", "import", text(&kalibr), "-o", text(&camera)]);
+    assert!(code == 0 && err.contains("kalibr"), "{err}");
+    let (code, out, err) = camsim(["lens", text(&camera), "check"]);
+    assert!(code == 0 && out.contains("100.000 %"), "{out}{err}");
+    let (code, out, _) = camsim(["camera", "import", text(&kalibr), "-q"]);
+    assert_eq!((code, out), (0, fs::read_to_string(&camera).unwrap()));
+}
+
+#[test]
+fn pictures_are_compared() {
+    let assets = assets();
+    let one = assets.join("acircles.png");
+    let (code, out, err) = camsim(["compare", text(&one), text(&one), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, err.as_str()), (0, ""));
+    assert_eq!((report["rmse"].as_f64(), report["max"].as_f64(), report["differing"].as_f64()), (Some(0.0), Some(0.0), Some(0.0)));
+    assert!(report["psnr_db"].is_null() && report["ssim"].as_f64().unwrap() > 0.999_999, "{report}");
+    let (code, out, _) = camsim(["compare", text(&one), text(&one)]);
+    assert!(code == 0 && out.contains("inf"), "{out}");
+}
+
+#[test]
+fn the_built_in_flight_is_tracked_and_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scenario, table) = (assets().join("pattern.toml"), folder.path().join("traj.csv"));
+    let (code, out, err) = camsim(["track", text(&scenario), "--rate", "25", "-o", text(&table), "--report", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert!(report["rms"]["north_m"].as_f64().unwrap() < 1.0 && report["max_used"]["speed_m_s"].is_f64(), "{report}");
+    assert!(report["max_error"]["attitude_deg"].is_f64(), "{report}");
+    let rows: Vec<Vec<f64>> = fs::read_to_string(&table)
+        .unwrap()
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    // 46 s at 25 Hz, both ends.
+    assert_eq!(rows.len(), 1151);
+    assert!(rows.iter().all(|row| row.len() == 20 && row.iter().all(|value| value.is_finite())));
+    assert!(rows.windows(2).all(|pair| (pair[1][0] - pair[0][0] - 0.04).abs() < 1e-8));
+
+    let (code, out, err) = camsim(["explain", text(&scenario), "--frame", "3", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((explained["plan"]["frame"].as_u64(), explained["frames"].as_u64()), (Some(3), Some(60)));
+    let (code, out, _) = camsim(["explain", text(&scenario), "--set", "camera.shutter.exposure_ms=0"]);
+    assert!(code == 0 && out.contains("skipped"), "{out}");
+}
+
+#[test]
+fn the_printed_scenario_is_a_scenario() {
+    let (code, out, _) = camsim(["render", "--print-default"]);
+    assert_eq!(code, 0);
+    for key in ["[flight]", "[tracker]", "[camera", "[scene", "[quality]", "[output]"] {
+        assert!(out.contains(key), "{key}");
+    }
+}
+
+#[test]
+fn bad_input_is_refused_with_its_place_and_a_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, content: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        text(&path).to_owned()
+    };
+    let scenario = text(&assets().join("pattern.toml")).to_owned();
+    let camera = text(&assets().join("demo_camera.toml")).to_owned();
+    let picture = text(&assets().join("acircles.png")).to_owned();
+    let other = text(&assets().join("vignette.png")).to_owned();
+    let no_toml = file("no.toml", "[flight\nlog = 3");
+    let unknown = file("unknown.toml", "[flight]\nlogg = \"a.csv\"\n[scene]\n");
+    let no_log = file("no_log.toml", "[flight]\nlog = \"nowhere.csv\"\n[scene.pattern]\nimage = \"a.png\"\nwidth_m = 9.0\n");
+    let binary = file("binary.toml", "\u{1}\u{2}\0");
+    let words = file("words.csv", "u,v\n1,two\n");
+    let no_focal = file("no_focal.toml", "size_px = [640, 480]\nfocal_px = [0.0, 100.0]\n");
+    let cases: Vec<(Vec<&str>, &str)> = vec![
+        (vec!["rendr"], "render"),
+        (vec!["render"], "SCENARIO"),
+        (vec!["render", "nowhere.toml"], "nowhere.toml"),
+        (vec!["render", &no_toml], "no.toml"),
+        (vec!["render", &binary], "binary.toml"),
+        (vec!["render", &unknown], "log"),
+        (vec!["render", &no_log], "nowhere.csv"),
+        (vec!["render", &scenario, "--frames", "5..2"], "holds no frame"),
+        (vec!["render", &scenario, "--frames", "58..99"], "ends with frame 59"),
+        (vec!["render", &scenario, "--shard", "5/4"], "I from 1 to N"),
+        (vec!["render", &scenario, "--outputs", "colour"], "coords"),
+        (vec!["render", &scenario, "--format", "none,png"], "stands alone"),
+        (vec!["render", &scenario, "--backend", "reference"], "not in this version"),
+        (vec!["render", &scenario, "--preset", "paper"], "quality.preset"),
+        (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
+        (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
+        (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),
+        (vec!["explain", &scenario, "--frame", "60"], "ends with frame 59"),
+        (vec!["explain", &scenario, "--set", "flight.window_s=[1.0, 1.001]", "--set", "camera.phase=0.9"], "window_s"),
+        (vec!["track", &scenario, "--rate", "0"], "--rate"),
+        (vec!["track", &scenario, "--rate", "NaN"], "--rate"),
+        (vec!["track", &scenario, "--json"], "--report"),
+        (vec!["lens", "nowhere.toml", "check"], "nowhere.toml"),
+        (vec!["lens", &no_focal, "check"], "focal_px"),
+        (vec!["lens", &camera, "distort", "--points", &words], "line 2: v is `two`"),
+        (vec!["lens", &camera, "undistort", "--points", &words], "x_px,y_px"),
+        (vec!["lens", &camera, "distort", "--points", "nowhere.csv"], "nowhere.csv"),
+        (vec!["camera", "import", &words], "known are"),
+        (vec!["camera", "import", &words, "--format", "colmap"], "kalibr"),
+        (vec!["compare", &picture, &other], "acircles.png"),
+        (vec!["compare", &picture, "nowhere.png"], "nowhere.png"),
+        (vec!["completions", "tcsh"], "zsh"),
+    ];
+    let mut faults = Vec::new();
+    for (args, wanted) in cases {
+        let (code, out, err) = camsim(args.clone());
+        if code != 2 || !err.contains(wanted) || !err.starts_with("error: ") {
+            faults.push(format!("{args:?} should say `{wanted}` and exit with 2, not {code}:\n{out}{err}"));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+    assert_eq!(camsim::<&str>([]).0, 2);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, "").unwrap();
+    let below = file.join("traj.csv");
+    let (code, _, err) = camsim(["track", text(&assets().join("pattern.toml")), "--rate", "1", "-o", text(&below)]);
+    assert!(code == 1 && err.contains("traj.csv"), "{err}");
+}

@@ -1,0 +1,74 @@
+//! Whole runs: `camsim render` with shards, resumption and timing only.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{ffi::OsString, fs, path::Path};
+
+/// Exit code, standard output, standard error.
+fn camsim(args: &[&str]) -> (u8, String, String) {
+    let (mut out, mut err) = (Vec::new(), Vec::new());
+    let args = std::iter::once("camsim").chain(args.iter().copied()).map(OsString::from);
+    let code = camsim_cli::run(args, &mut out, &mut err);
+    (code, String::from_utf8(out).unwrap(), String::from_utf8(err).unwrap())
+}
+
+fn bytes(folder: &Path, file: &str) -> Vec<u8> {
+    fs::read(folder.join(file)).unwrap()
+}
+
+fn run_json(folder: &Path) -> serde_json::Value {
+    serde_json::from_slice(&bytes(folder, "run.json")).unwrap()
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn shards_and_resumption_give_the_bytes_of_one_run() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let temporary = tempfile::tempdir().unwrap();
+    let (whole, parts) = (temporary.path().join("whole"), temporary.path().join("parts"));
+    let render = |folder: &Path, more: &[&str]| {
+        let common =
+            ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,rows", "--format", "exr,png"];
+        // A small camera: the order of frames is what matters here.
+        let small =
+            ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
+        camsim(&[&common[..], &small, &["--set", "camera.photometric.noise_sigma=0.01"], more].concat())
+    };
+    let (code, out, err) = render(&whole, &["--frames", "2..6"]);
+    assert!(code == 0 && out.starts_with("4 frames in"), "{out}{err}");
+    for shard in ["2/2", "1/2"] {
+        let (code, out, err) = render(&parts, &["--frames", "2..6", "--shard", shard]);
+        assert!(code == 0 && out.starts_with("2 frames in"), "{out}{err}");
+    }
+    fs::remove_file(parts.join("color/frame_000004.exr")).unwrap();
+    let (code, out, err) = render(&parts, &["--frames", "2..6", "--resume"]);
+    assert!(code == 0 && out.starts_with("1 frames (3 were there already)"), "{out}{err}");
+    for frame in 2..6 {
+        for file in [format!("color/frame_{frame:06}.exr"), format!("color/frame_{frame:06}.png"), format!("rows/frame_{frame:06}.csv")] {
+            assert_eq!(bytes(&whole, &file), bytes(&parts, &file), "{file}");
+        }
+    }
+    for table in ["camera.toml", "trajectory.csv", "frames.csv"] {
+        assert_eq!(bytes(&whole, table), bytes(&parts, table), "{table}");
+    }
+    let (one, resumed) = (run_json(&whole), run_json(&parts));
+    assert_eq!((one["written"].as_u64(), one["finished"].as_bool()), (Some(4), Some(true)));
+    assert_eq!((resumed["written"].as_u64(), resumed["skipped"].as_u64()), (Some(1), Some(3)));
+    assert_eq!(one["scenario"], resumed["scenario"]);
+
+    // Another scenario is never mixed in.
+    let (code, _, err) = render(&parts, &["--frames", "2..6", "--resume", "--set", "seed=99"]);
+    assert!(code == 2 && err.contains("seed"), "{err}");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn timing_runs_write_no_frame() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path().join("timing");
+    let (code, out, err) =
+        camsim(&["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0,3", "--format", "none"]);
+    assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
+    assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
+}
