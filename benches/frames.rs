@@ -1,0 +1,136 @@
+//! Frames a second of the built-in flight: as a whole, and with each effect left out.
+//!
+//! A machine is never quite idle, so what is compared is measured in turn: each round renders the same few frames with every variant,
+//! and a stage's cost is the median over the rounds of the difference to the full camera *in the same round*. A time a frame is that of
+//! a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it, files are not.
+//!
+//! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+
+#![allow(clippy::print_stdout, reason = "the table is what this program is for")]
+
+use std::{
+    convert::Infallible,
+    time::{Duration, Instant},
+};
+
+use camsim::{
+    core::scenario::Channel,
+    gpu::{AdapterChoice, Engine, engine::Session},
+};
+
+mod flight;
+
+use flight::{Outcome, Without};
+
+/// Frames of a burst: enough for two in flight to pay, few enough for many rounds.
+const BURST: u64 = 6;
+/// Rounds, unless time runs out before.
+const ROUNDS: usize = 15;
+/// No round begins after this.
+const BUDGET: Duration = Duration::from_secs(90);
+
+/// One row of the table.
+struct Variant<'a> {
+    name: &'static str,
+    session: Session<'a>,
+    /// Renders one frame over and over: its ideal frame is drawn once and kept.
+    still: bool,
+    /// Session and first frame: upload, pipelines, lens map.
+    start: Duration,
+    /// Milliseconds a frame, one entry a round.
+    ms: Vec<f64>,
+}
+
+fn main() -> Outcome<()> {
+    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know whether it works.
+    let measuring = std::env::args().any(|argument| argument == "--bench");
+    let loaded = flight::load()?;
+    let demo = &loaded.sequence;
+    let engine = Engine::new(AdapterChoice::Best)?;
+    let [width, height] = demo.scenario.camera.size_px;
+    println!("adapter   {}", engine.gpu().adapter);
+    println!("frames    {width}x{height} of the built-in flight, read back, nothing encoded");
+    let plain = &demo.scenario.output.channels;
+    let with_truth = [plain.as_slice(), &[Channel::Depth, Channel::Coords]].concat();
+    let mut variants = Vec::new();
+    for (name, without, channels, still) in [
+        ("the full camera", Without::Nothing, plain, false),
+        ("+ depth and coords", Without::Nothing, &with_truth, false),
+        ("- ideal render (frame kept)", Without::Nothing, plain, true),
+        ("- vignette and noise", Without::Photometric, plain, false),
+        ("- motion blur", Without::Blur, plain, false),
+        ("- rolling shutter", Without::RollingShutter, plain, false),
+        ("- blur and rolling shutter", Without::Time, plain, false),
+        ("- lens", Without::Lens, plain, false),
+        ("- all of these: a perfect camera", Without::Anything, plain, false),
+    ] {
+        let begin = Instant::now();
+        let mut session = engine.session::<Infallible>(without.of(demo)?, channels)?;
+        // The first dispatch of a pipeline compiles it.
+        render(&mut session, 0..2)?;
+        variants.push(Variant { name, session, still, start: begin.elapsed(), ms: Vec::new() });
+    }
+    let plan = variants[0].session.planner().plan(0)?;
+    let [ideal_width, ideal_height] = plan.ideal.size_px;
+    println!("ideal     {ideal_width}x{ideal_height} px in frame 0, {} exposure nodes", plan.blur.map_or(1, |blur| blur.nodes));
+
+    let begin = Instant::now();
+    for round in 0..if measuring { ROUNDS } else { 1 } {
+        if begin.elapsed() > BUDGET {
+            break;
+        }
+        let burst = if measuring { BURST } else { 1 };
+        let first = (round as u64 * BURST) % (demo.frames - BURST);
+        // Each variant takes each place in the round once in a while.
+        let count = variants.len();
+        for place in 0..count {
+            let variant = &mut variants[(place + round) % count];
+            if variant.still {
+                render(&mut variant.session, [first])?;
+            }
+            let begin = Instant::now();
+            render(&mut variant.session, (first..first + burst).map(|frame| if variant.still { first } else { frame }))?;
+            variant.ms.push(ms(begin.elapsed()) / burst as f64);
+        }
+    }
+    print_table(&variants);
+    Ok(())
+}
+
+fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> Outcome<()> {
+    Ok(session.render::<Infallible>(frames, &mut |finished| {
+        std::hint::black_box(finished);
+        Ok(())
+    })?)
+}
+
+fn ms(duration: Duration) -> f64 {
+    1e3 * duration.as_secs_f64()
+}
+
+fn print_table(variants: &[Variant<'_>]) {
+    let full = &variants[0].ms;
+    println!("rounds    {} of {BURST} frames, variants in turn", full.len());
+    println!();
+    println!("| variant | ms a frame: median | quartiles | frames/s | against the full camera, ms | start, s |");
+    println!("|---|---|---|---|---|---|");
+    for variant in variants {
+        let [low, median, high] = quartiles(variant.ms.clone());
+        let [_, against, _] = quartiles(variant.ms.iter().zip(full).map(|(own, full)| own - full).collect());
+        let name = variant.name;
+        let start_s = variant.start.as_secs_f64();
+        println!("| {name} | {median:.1} | {low:.1} .. {high:.1} | {:.1} | {against:+.1} | {start_s:.2} |", 1e3 / median);
+    }
+}
+
+/// Lower quartile, median, upper quartile.
+fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_by(f64::total_cmp);
+    let at = |part: f64| {
+        let place = part * (values.len().saturating_sub(1)) as f64;
+        let (below, rest) = (place.floor() as usize, place.fract());
+        let value = |i: usize| values.get(i).or(values.last()).copied().unwrap_or(f64::NAN);
+        value(below) + rest * (value(below + 1) - value(below))
+    };
+    [at(0.25), at(0.5), at(0.75)]
+}
