@@ -2,9 +2,13 @@
 
 use std::path::PathBuf;
 
-use camsim_core::scenario::{Preset, Scenario};
+use camsim_core::{
+    flight_log::FlightLog,
+    scenario::{Preset, Scenario},
+    tracker::Tracked,
+};
 use camsim_io::{
-    load::{Loaded, load_sequence},
+    load::{Loaded, flight_warnings, load_flight, load_sequence},
     scenario_file::read_scenario,
 };
 
@@ -68,6 +72,15 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
     }
     console.detail(format_args!("{}: {}", scenario.flight.log.display(), loaded.log.report));
     Ok(loaded)
+}
+
+/// Loads the log and tracks it; no scene is read.
+pub fn load_flight_only(scenario: &Scenario, console: &mut Console<'_>) -> Result<(FlightLog, Tracked), Failure> {
+    let (log, tracked) = load_flight(scenario).or_bad_input()?;
+    for warning in flight_warnings(scenario, &log, &tracked) {
+        console.warn(warning);
+    }
+    Ok((log, tracked))
 }
 
 #[cfg(test)]

@@ -83,11 +83,9 @@ pub struct Loaded {
 /// # Errors
 /// [`LoadError`] names the file or key and what to do.
 pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
-    let (log_height, terrain_shift) = height_plan(scenario);
-    let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
-    let tracked = track(&log.rows, &scenario.tracker)?;
+    let (log, tracked) = load_flight(scenario)?;
     let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount)?;
-    let (scene, terrain) = load_scene(scenario, &log, terrain_shift)?;
+    let (scene, terrain) = load_scene(scenario, &log)?;
     let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose()?.map(Arc::new);
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
@@ -105,6 +103,17 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings })
 }
 
+/// The log and its trajectory alone: no scene is read.
+///
+/// # Errors
+/// As [`load_sequence`].
+pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, Tracked), LoadError> {
+    let (log_height, _) = height_plan(scenario);
+    let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
+    let tracked = track(&log.rows, &scenario.tracker)?;
+    Ok((log, tracked))
+}
+
 /// Equal vertical datums need no conversion; else whichever is above mean sea level goes through the geoid.
 fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
     let log = scenario.flight.height;
@@ -116,7 +125,7 @@ fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
     }
 }
 
-fn load_scene(scenario: &Scenario, log: &FlightLog, shift_terrain: bool) -> Result<(Scene, Option<TerrainSummary>), LoadError> {
+fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>), LoadError> {
     let spec = &scenario.scene;
     let mut scene = Scene {
         sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
@@ -130,6 +139,7 @@ fn load_scene(scenario: &Scenario, log: &FlightLog, shift_terrain: bool) -> Resu
         // One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each thread that reads terrain.
         thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
         let undulation = |lat_rad, lon_rad| GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }));
+        let (_, shift_terrain) = height_plan(scenario);
         let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
         scene.terrain = Some(loaded.terrain);
         summary = Some(loaded.summary);
@@ -196,11 +206,18 @@ fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64
     if rows.is_empty() { Err(fail(None, "there are no rows".into())) } else { Ok(rows) }
 }
 
-fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
+/// What log and tracker have to say: limits that held the platform back, repairs.
+#[must_use]
+pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
     let mut warnings = tracked.warnings();
     if !log.report.is_clean() {
-        warnings.push(format!("{}: {}", sequence.scenario.flight.log.display(), log.report));
+        warnings.push(format!("{}: {}", scenario.flight.log.display(), log.report));
     }
+    warnings
+}
+
+fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
+    let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
     let (first_s, last_s) = sequence.path.span_s();
     let fps = sequence.scenario.camera.fps;
     let end_s = sequence.start_s + (sequence.frames - 1) as f64 / fps;

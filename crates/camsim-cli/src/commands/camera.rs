@@ -1,9 +1,9 @@
 //! `camsim camera import`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_io::camera_file::{CameraFormat, import_camera_as};
+use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_as};
 
 use crate::{
     console::Console,
@@ -55,7 +55,8 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             Some(known.ok_or_else(|| Failure::bad_input(anyhow!("--format {name} is not known")))?)
         }
     };
-    let imported = import_camera_as(&args.file, format).or_bad_input()?;
+    let mut imported = import_camera_as(&args.file, format).or_bad_input()?;
+    keep_vignette_in_reach(&mut imported, &args.file);
     console.note(format_args!("{}: read as {}", args.file.display(), imported.format.name()));
     for note in &imported.notes {
         console.note(format_args!("note: {note}"));
@@ -65,6 +66,19 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     write_output(args.output.as_deref(), console, |out| out.write_all(text.as_bytes()))
 }
 
-fn file_name(path: &std::path::Path) -> String {
+/// A vignette is named relative to the calibration; the CAMERA.toml may be written elsewhere, so the path is made absolute where it leads
+/// to a file, and spoken of where it doesn't.
+fn keep_vignette_in_reach(imported: &mut ImportedCamera, calibration: &Path) {
+    let Some(vignette) = &mut imported.spec.photometric.vignette else { return };
+    match calibration.parent().unwrap_or(Path::new("")).join(&vignette).canonicalize() {
+        Ok(found) => *vignette = found,
+        Err(_) => imported.notes.push(format!(
+            "the vignette map {} is not beside the calibration: put it there, or correct photometric.vignette",
+            vignette.display()
+        )),
+    }
+}
+
+fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().replace(|c: char| c.is_control(), " ")
 }

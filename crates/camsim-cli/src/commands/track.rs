@@ -59,14 +59,13 @@ struct Report<'a> {
 /// Tracks the log, writes the motion, prints the report.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read()?;
-    let loaded = inputs::load(&scenario, console)?;
-    let tracked = &loaded.tracked;
+    let (log, tracked) = inputs::load_flight_only(&scenario, console)?;
     let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
     let rows = row_count(&tracked.trajectory, rate_hz)?;
     if args.output.is_some() || !args.report {
         let trajectory = &tracked.trajectory;
         let last_s = trajectory.span_s().0 + (rows - 1) as f64 / rate_hz;
-        let records = render_run::motion(trajectory, loaded.sequence.epoch_ns, rate_hz, [trajectory.span_s().0, last_s]);
+        let records = render_run::motion(trajectory, log.epoch_ns, rate_hz, [trajectory.span_s().0, last_s]);
         let table = trajectory_csv(records);
         write_output(args.output.as_deref(), console, |out| out.write_all(table.as_bytes()))?;
     }
@@ -74,9 +73,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console.note(format_args!("{rows} rows in {}", path.display()));
     }
     if args.report {
-        let measured =
-            tracked.report(&loaded.log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
-        report(args.json, tracked, &measured, console)?;
+        let measured = tracked.report(&log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
+        report(args.json, &tracked, &measured, console)?;
     }
     Ok(())
 }
