@@ -9,7 +9,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{FramePlan, PlanError, Planner, RayStage, line_poses},
+    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage, line_poses},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -143,6 +143,7 @@ impl Engine {
 struct Drawn {
     pose: CameraPose,
     ideal: IdealGeometry,
+    edges: EdgeStage,
     target: usize,
     lod: LodSelection,
 }
@@ -304,8 +305,8 @@ impl Session<'_> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
         let target = &self.targets[drawn.target];
         let [width, height] = drawn.ideal.size_px;
-        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height, wgpu::TextureAspect::All)?;
-        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height, wgpu::TextureAspect::DepthOnly)?;
+        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height)?;
+        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height)?;
         self.engine.check()?;
         let near_m = camsim_core::plan::NEAR_M as f32;
         Ok(Some((drawn.ideal, color.iter().flatten().map(|v| v.to_f32()).collect(), depth.iter().map(|d| d / near_m).collect())))
@@ -364,16 +365,16 @@ impl Session<'_> {
 
     /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
     fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal) {
+        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal && drawn.edges == plan.edges) {
             return;
         }
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(&plan.ideal, gpu.max_side_px());
-        let target = self.targets.iter().position(|target| target.allocated_px == size_px).unwrap_or_else(|| {
+        let target = self.targets.iter().position(|target| target.serves(size_px, plan.edges)).unwrap_or_else(|| {
             if self.targets.len() == MAX_TARGETS {
                 self.targets.remove(0);
             }
-            self.targets.push(IdealTarget::new(gpu, size_px));
+            self.targets.push(IdealTarget::new(gpu, size_px, plan.edges));
             self.targets.len() - 1
         });
         let sequence = self.planner.sequence();
@@ -387,7 +388,7 @@ impl Session<'_> {
             sequence.scenario.quality.max_terrain_error_px,
             &self.targets[target],
         );
-        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, target, lod });
+        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, target, lod });
     }
 
     /// Pass 3: the output frame.
@@ -411,6 +412,7 @@ impl Session<'_> {
             noise_table: &self.noise_table,
             color: &view(&target.color),
             depth: &view(&target.depth),
+            fine: target.fine.as_ref(),
             poses: &slot.poses,
             vignette: &self.vignette,
             lens_map: lens_map.as_ref(),
@@ -468,7 +470,7 @@ fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
         .collect()
 }
 
-fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32, aspect: wgpu::TextureAspect) -> Result<Vec<T>, GpuError> {
+fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32) -> Result<Vec<T>, GpuError> {
     let row = width * size_of::<T>() as u32;
     let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     // Depth can only be copied whole.
@@ -482,7 +484,7 @@ fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, wid
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
     encoder.copy_texture_to_buffer(
-        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect },
+        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
         wgpu::TexelCopyBufferInfo {
             buffer: &buffer,
             layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },

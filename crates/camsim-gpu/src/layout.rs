@@ -30,7 +30,11 @@ pub struct FrameUniforms {
     pub frame_number: u32,
     pub mono: u32,
     pub exposure_travel_px_m: f32,
-    pub pad0: f32,
+    pub edge_scale: u32,
+    pub edge_samples: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
     pub key_position_ned_m: [f32; 4],
     pub ned_from_key_x: [f32; 4],
     pub ned_from_key_y: [f32; 4],
@@ -110,7 +114,7 @@ mod tests {
         assert_mirror!(&module, "Frame", FrameUniforms, [
             size_px, ideal_size_px, ideal_focal_px, ideal_principal_px, focal_px, principal_px, near_m, nodes, line_axis, lines, fields,
             iterations, samples_per_px, max_samples, max_taps, coords_phase, light, noise_sigma, vignette_thresholds, seed, frame_number,
-            mono, exposure_travel_px_m, pad0, key_position_ned_m, ned_from_key_x, ned_from_key_y, ned_from_key_z,
+            mono, exposure_travel_px_m, edge_scale, edge_samples, pad0, pad1, pad2, key_position_ned_m, ned_from_key_x, ned_from_key_y, ned_from_key_z,
         ]);
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
         let module = parse(shaders::compose("ideal/terrain.wgsl", &[]).unwrap());

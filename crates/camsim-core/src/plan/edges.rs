@@ -18,7 +18,9 @@ use crate::{
 const BLOCK_CELLS: u32 = 8;
 /// A slope this close to the view's own already counts as edge-on.
 const FACING_MARGIN: f64 = 0.95;
-/// Above this tolerance (1/255 RMS) one ideal pixel a pixel with 4 samples does, else 4 ideal pixels with 16 samples are drawn.
+/// From this tolerance (1/255 RMS) on silhouettes are left as one sample a pixel shows them.
+const IGNORED_DN: f64 = 16.0;
+/// From this tolerance (1/255 RMS) on one ideal pixel a pixel with 4 samples does, else 4 ideal pixels with 16 samples are drawn.
 const COARSE_DN: f64 = 4.0;
 /// A flat mesh with more corners than this is not looked at any closer.
 const MAX_FLAT_VERTICES: usize = 64;
@@ -109,6 +111,10 @@ pub(super) fn edge_stage(
 ) -> EdgeStage {
     if let Some(reason) = outline.reason_for_none(scene, pose, ideal.tangents(), travel_m) {
         skipped.push(Skip { what: "silhouette supersampling", reason });
+        return EdgeStage::None;
+    }
+    if quality.max_error_dn >= IGNORED_DN {
+        skipped.push(Skip { what: "silhouette supersampling", reason: format!("quality.max_error_dn is {IGNORED_DN} or more") });
         return EdgeStage::None;
     }
     let fits = ideal.size_px.iter().all(|&side| side.next_multiple_of(64) <= max_side_px / 2);
