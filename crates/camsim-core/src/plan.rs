@@ -262,7 +262,7 @@ impl Planner {
         let ray = ray_stage(&reach, &mut skipped);
         let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
-        let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, quality, self.max_side_px, &mut skipped);
+        let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,

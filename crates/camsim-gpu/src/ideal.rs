@@ -114,17 +114,12 @@ impl IdealPass {
         let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, both, wgpu::BufferBindingType::Uniform)]);
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
         let [texture, sampler] = texture_entries();
-        let terrain_layout = layout("camsim.ideal.terrain", &[
-            texture,
-            sampler,
-            buffer_entry(2, wgpu::ShaderStages::VERTEX, storage),
-            buffer_entry(3, wgpu::ShaderStages::VERTEX, storage),
-        ]);
-        let mesh_layout = layout("camsim.ideal.mesh", &[
-            texture,
-            sampler,
-            buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform),
-        ]);
+        let terrain_layout = layout(
+            "camsim.ideal.terrain",
+            &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, storage), buffer_entry(3, wgpu::ShaderStages::VERTEX, storage)],
+        );
+        let mesh_layout =
+            layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         let mesh_vertices = wgpu::VertexBufferLayout {
             array_stride: 20,
             step_mode: wgpu::VertexStepMode::Vertex,
@@ -162,20 +157,26 @@ impl IdealPass {
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
         let sampler = wgpu::BindingResource::Sampler(&buffers.sampler);
         let terrain_group = buffers.terrain.as_ref().map(|terrain| {
-            group(&self.terrain_layout, &[
-                entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
-                entry(1, sampler.clone()),
-                entry(2, terrain.vertices.as_entire_binding()),
-                entry(3, draws.as_entire_binding()),
-            ])
+            group(
+                &self.terrain_layout,
+                &[
+                    entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
+                    entry(1, sampler.clone()),
+                    entry(2, terrain.vertices.as_entire_binding()),
+                    entry(3, draws.as_entire_binding()),
+                ],
+            )
         });
         let mesh_groups = buffers.meshes.iter().zip(0_u64..).map(|(mesh, i)| {
             let placement = wgpu::BufferBinding { buffer: &placements, offset: i * PLACEMENT_STRIDE, size: wgpu::BufferSize::new(16) };
-            group(&self.mesh_layout, &[
-                entry(0, wgpu::BindingResource::TextureView(&mesh.texture)),
-                entry(1, sampler.clone()),
-                entry(2, wgpu::BindingResource::Buffer(placement)),
-            ])
+            group(
+                &self.mesh_layout,
+                &[
+                    entry(0, wgpu::BindingResource::TextureView(&mesh.texture)),
+                    entry(1, sampler.clone()),
+                    entry(2, wgpu::BindingResource::Buffer(placement)),
+                ],
+            )
         });
         let mesh_groups = mesh_groups.collect();
         IdealSlot { camera, draws, placements, camera_group, terrain_group, mesh_groups }
@@ -275,7 +276,9 @@ impl IdealPass {
             let (range, last) = match &chunk.void_indices {
                 Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
                 None => {
-                    let same = |d: &&camsim_core::scene::ChunkDraw| d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none();
+                    let same = |d: &&camsim_core::scene::ChunkDraw| {
+                        d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none()
+                    };
                     let count = order[first..].iter().take_while(|d| same(d)).count();
                     (on_device.levels[draw.level as usize].clone(), first + count)
                 }
@@ -367,7 +370,12 @@ fn pipeline(
     Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(file),
         layout: Some(&layout),
-        vertex: wgpu::VertexState { module: &module, entry_point: Some("vertex"), compilation_options: compilation_options.clone(), buffers },
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("vertex"),
+            compilation_options: compilation_options.clone(),
+            buffers,
+        },
         primitive: wgpu::PrimitiveState::default(),
         depth_stencil: Some(wgpu::DepthStencilState {
             format: DEPTH_FORMAT,

@@ -8,15 +8,15 @@
 // Largest depth value of the ideal frame, as bits.
 @group(1) @binding(7) var<storage, read> nearest: u32;
 
-// Kronecker sequence of the plastic number: even over the pixel's area for any number of rays.
-const SPREAD: vec2<f32> = vec2<f32>(0.7548776662, 0.5698402910);
-// Most looks along the parallax of a ray, and their distance in ideal pixels while there are fewer.
-const MAX_LOOKS: u32 = 64u;
+// Golden ratio: multiples are even over an interval for any number of them.
+const GOLDEN: f32 = 0.6180339887;
+// Looks along the parallax of a ray: their distance in ideal pixels, and how many at most.
 const LOOK_PX: f32 = 0.5;
-// A surface this close to the ray's point, in ideal pixels of parallax, is where the ray ends.
-const MEETS_PX: f32 = 0.3;
-// Two depths closer than this, in ideal pixels of parallax, are of one surface.
-const SAME_SURFACE_PX: f32 = 1.0;
+const MAX_LOOKS: u32 = 64u;
+// Fixed-point steps from each look.
+const LOOK_STEPS: u32 = 4u;
+// A depth that gives itself again to within this, in ideal pixels of parallax, is where the ray meets a surface.
+const MEETS_PX: f32 = 0.05;
 
 struct FineSample {
     texel: vec2<i32>,
@@ -56,6 +56,14 @@ fn passes_edge(a_px: vec2<f32>, b_px: vec2<f32>) -> bool {
     return false;
 }
 
+// Ray i of `frame.edge_samples`: place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
+fn ray_place(i: u32) -> vec3<f32> {
+    let step = 1.0 / f32(frame.edge_samples);
+    let x = (f32(i) + 0.5) * step;
+    let y = f32(reverseBits(i) >> 8u) / 16777216.0 + 0.5 * step;
+    return vec3<f32>(x - 0.5, y - 0.5, fract(GOLDEN * (f32(i) + 0.5)));
+}
+
 fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     var edge = plain.color.a < 0.9999;
     for (var node = 0u; HAS_PARALLAX && !edge && node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
@@ -69,10 +77,10 @@ fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     }
     var sum = vec3<f32>(0.0);
     for (var i = 0u; i < frame.edge_samples; i++) {
-        let f = fract(SPREAD * (f32(i) + 0.5)) - 0.5;
+        let f = ray_place(i).xy;
         let uv = ray.uv + f.x * ray.d_dx + f.y * ray.d_dy;
-        // Time runs evenly; nodes are equally far apart in time.
-        let along = (f32(i) + 0.5) / f32(frame.edge_samples) * f32(frame.nodes - 1u);
+        // Nodes are equally far apart in time.
+        let along = ray_place(i).z * f32(frame.nodes - 1u);
         let node = min(u32(along), max(frame.nodes, 2u) - 2u);
         var pose = pose_at_node(pixel, node);
         if (frame.nodes > 1u) {
@@ -84,38 +92,42 @@ fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
 }
 
 // Where a ray first meets a surface of the ideal frame, in ideal pixels. The ray's points, from the nearest surface of all to infinity,
-// lie on a line of the ideal frame; the ray ends where the depth there is its own. Passing behind a surface's border is no end. If the
-// key camera did not see what the ray meets, the farthest surface beside it stands in.
+// lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several the nearest
+// counts. If there is none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
 fn first_surface_px(uv: vec2<f32>, pose: Pose) -> vec2<f32> {
     let w_near = nearest_inverse_depth();
     let near_px = ideal_px_from_point(point_at(uv, pose, w_near));
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
     let px_per_w = distance(near_px, far_px) / max(w_near, 1e-12);
+    if (px_per_w * w_near < 0.1 * MEETS_PX) {
+        return far_px;
+    }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);
-    var farthest = w_near;
-    var surface = 0.0;
-    var met = px_per_w * w_near < 1e-3;
-    var before = 0.0;
-    var gap_before = -1.0;
-    for (var i = 0u; i <= looks && !met; i++) {
-        let w = w_near * (1.0 - f32(i) / f32(looks));
-        surface = line_inverse_depth(uv, pose, fine_inverse_depth(ideal_px_from_point(point_at(uv, pose, w))));
-        let gap = (surface - w) * px_per_w;
-        let crossed = gap_before < 0.0 && gap >= 0.0 && abs(surface - before) * px_per_w < SAME_SURFACE_PX;
-        met = abs(gap) < MEETS_PX || crossed;
-        farthest = min(farthest, surface);
-        before = surface;
-        gap_before = gap;
-    }
-    if (!met) {
-        return ideal_px_from_point(point_at(uv, pose, farthest));
-    }
-    // Closer looks, on the same surface only.
-    for (var i = 0u; i < 2u; i++) {
-        let closer = line_inverse_depth(uv, pose, fine_inverse_depth(ideal_px_from_point(point_at(uv, pose, surface))));
-        if (abs(closer - surface) * px_per_w < MEETS_PX) {
-            surface = closer;
+    var met = -1.0;
+    var met_px = far_px;
+    var farthest = 1e30;
+    var farthest_px = far_px;
+    for (var i = 0u; i <= looks; i++) {
+        var w = w_near * (1.0 - f32(i) / f32(looks));
+        if (w <= met) {
+            break;
+        }
+        for (var k = 0u; k < LOOK_STEPS; k++) {
+            let at_px = ideal_px_from_point(point_at(uv, pose, w));
+            let found = line_inverse_depth(uv, pose, fine_inverse_depth(at_px));
+            if (found < farthest) {
+                farthest = found;
+                farthest_px = at_px;
+            }
+            if (abs(found - w) * px_per_w < MEETS_PX) {
+                if (found > met) {
+                    met = found;
+                    met_px = at_px;
+                }
+                break;
+            }
+            w = found;
         }
     }
-    return ideal_px_from_point(point_at(uv, pose, surface));
+    return select(farthest_px, met_px, met >= 0.0);
 }

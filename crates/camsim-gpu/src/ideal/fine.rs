@@ -36,7 +36,14 @@ pub(super) fn scale_of(edges: EdgeStage) -> Option<u32> {
     }
 }
 
-pub(super) fn texture(gpu: &GpuContext, label: &str, size_px: [u32; 2], format: wgpu::TextureFormat, samples: u32, usage: wgpu::TextureUsages) -> wgpu::Texture {
+pub(super) fn texture(
+    gpu: &GpuContext,
+    label: &str,
+    size_px: [u32; 2],
+    format: wgpu::TextureFormat,
+    samples: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
@@ -126,7 +133,14 @@ impl ResolvePass {
     }
 
     /// Records the resolve of `size_px` ideal pixels.
-    pub(super) fn encode(&self, gpu: &GpuContext, encoder: &mut wgpu::CommandEncoder, size_px: [u32; 2], target: &IdealTarget, fine: &FineTarget) {
+    pub(super) fn encode(
+        &self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        size_px: [u32; 2],
+        target: &IdealTarget,
+        fine: &FineTarget,
+    ) {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (depth_samples, averaged, color, depth) = (fine.depth_view(), view(&fine.averaged), view(&target.color), view(&target.depth));
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
