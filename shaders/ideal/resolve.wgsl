@@ -1,5 +1,5 @@
 // From the samples of a supersampled ideal frame to one colour and depth a pixel, as the plain gather reads them; alpha is 0 where a
-// pixel and its neighbours show more than one surface. Twin of the edge test: camsim_core::temporal::shows_edge.
+// pixel and its neighbours show more than one surface. Twin of `steps`: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
 
 @group(0) @binding(0) var fine_depth: texture_depth_multisampled_2d;
