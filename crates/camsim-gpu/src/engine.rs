@@ -31,6 +31,8 @@ use crate::{
 const FRAMES_IN_FLIGHT: usize = 2;
 /// Ideal targets of different size that are kept.
 const MAX_TARGETS: usize = 4;
+/// The same for supersampled ones, which take 16 times the memory.
+const MAX_FINE_TARGETS: usize = 2;
 
 /// Errors of rendering; `E` is the sink's own.
 #[derive(Debug, thiserror::Error)]
@@ -371,8 +373,13 @@ impl Session<'_> {
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(&plan.ideal, gpu.max_side_px());
         let target = self.targets.iter().position(|target| target.serves(size_px, plan.edges)).unwrap_or_else(|| {
-            if self.targets.len() == MAX_TARGETS {
-                self.targets.remove(0);
+            let fine = plan.edges != EdgeStage::None;
+            let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
+            let alike = |target: &IdealTarget| target.fine.is_some() == fine;
+            if self.targets.iter().filter(|target| alike(target)).count() >= limit {
+                // `drawn` may name a target behind the oldest, but is replaced below before anybody looks.
+                let oldest = self.targets.iter().position(alike).unwrap_or_default();
+                self.targets.remove(oldest);
             }
             self.targets.push(IdealTarget::new(gpu, size_px, plan.edges));
             self.targets.len() - 1

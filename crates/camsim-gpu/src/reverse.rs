@@ -3,7 +3,7 @@
 //! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text. [`PipelineKey::all`] lists
 //! every legal composition.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 
 use camsim_core::{
     photometric::is_mono,
@@ -165,11 +165,10 @@ impl ReversePass {
         size_px: [u32; 2],
         bindings: &ReverseBindings<'_>,
     ) -> Result<(), ComposeError> {
-        if !self.variants.contains_key(&key) {
-            let variant = Variant::new(gpu, key)?;
-            self.variants.insert(key, variant);
-        }
-        let variant = &self.variants[&key];
+        let variant = match self.variants.entry(key) {
+            Entry::Occupied(compiled) => compiled.into_mut(),
+            Entry::Vacant(first_use) => first_use.insert(Variant::new(gpu, key)?),
+        };
         let groups = variant.bind(gpu, &self.sampler, bindings);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("reverse"), timestamp_writes: None });
         pass.set_pipeline(&variant.pipeline);

@@ -172,11 +172,19 @@ fn fine_samples(sequence: &Sequence, plan: &FramePlan, scale: u32) -> (Vec<FineS
     let camera_from_ned = plan.key_pose.ned_from_camera.inverse();
     let samples: Vec<FineSample> = (0..width * height)
         .into_par_iter()
-        .flat_map_iter(|i| FineImage::SAMPLE_PLACES.map(|place| (DVec2::new(f64::from(i % width), f64::from(i / width)) + place) / f64::from(scale) - 0.5))
+        .flat_map_iter(|i| {
+            FineImage::SAMPLE_PLACES.map(|place| (DVec2::new(f64::from(i % width), f64::from(i / width)) + place) / f64::from(scale) - 0.5)
+        })
         .map(|at_px| {
             let ray = plan.key_pose.ned_from_camera * ((at_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
             let origin = plan.key_pose.position_ned_m;
-            let mut hits = sequence.scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY)).map(|hit| hit.0).collect::<Vec<_>>();
+            let mut hits = sequence
+                .scene
+                .meshes
+                .iter()
+                .filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY))
+                .map(|hit| hit.0)
+                .collect::<Vec<_>>();
             hits.sort_by(f64::total_cmp);
             let depth_m = hits.first().map(|&t| (camera_from_ned * (t * ray)).z);
             FineSample { inverse_depth: depth_m.map_or(0.0, |z| 1.0 / z), color: cast(&sequence.scene, origin, ray).0 }

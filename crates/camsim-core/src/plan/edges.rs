@@ -256,8 +256,9 @@ impl View {
         let down_m = patch.bounds.min.z - camera.z - travel_m;
         let ahead = (patch.bounds.max - camera).abs().max((patch.bounds.min - camera).abs());
         let ahead_m = ahead.truncate().length() + travel_m;
-        // Written so that a NaN counts as a silhouette.
-        patch.rim || !(patch.slope * ahead_m < FACING_MARGIN * down_m)
+        // False for a NaN, which so counts as a silhouette.
+        let faces_camera = patch.slope * ahead_m < FACING_MARGIN * down_m;
+        patch.rim || !faces_camera
     }
 }
 

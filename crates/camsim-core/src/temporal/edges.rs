@@ -39,7 +39,8 @@ pub struct FineImage<'a> {
 
 impl FineImage<'_> {
     /// Standard places of the samples, fine pixels from the fine pixel's top-left corner: one in each quarter, in the order of quarters.
-    pub const SAMPLE_PLACES: [DVec2; 4] = [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
+    pub const SAMPLE_PLACES: [DVec2; 4] =
+        [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
 
     /// The sample of the quarter of a fine pixel that holds a position; positions outside go to the border.
     #[must_use]
