@@ -18,24 +18,33 @@ const EDGE_STEP: f32 = 0.01;
 var<workgroup> around: array<f32, 100>;
 var<workgroup> group_nearest: atomic<u32>;
 
+// Samples of a pixel that differ by less than this, relative to the nearest, are averaged as one surface.
+const ONE_SURFACE: f32 = 0.02;
+
 struct Spread {
-    sum: f32,
+    mean: f32,
     low: f32,
     high: f32,
 }
 
-fn pixel_spread(pixel: vec2<i32>, scale: i32) -> Spread {
+// Over the samples of a pixel that are not below `at_least`.
+fn pixel_spread(pixel: vec2<i32>, scale: i32, at_least: f32) -> Spread {
     var found = Spread(0.0, 1e30, 0.0);
+    var count = 0.0;
     for (var y = 0; y < scale; y++) {
         for (var x = 0; x < scale; x++) {
             for (var i = 0; i < SAMPLES; i++) {
                 let d = textureLoad(fine_depth, pixel * scale + vec2<i32>(x, y), i);
-                found.sum += d;
-                found.low = min(found.low, d);
-                found.high = max(found.high, d);
+                if (d >= at_least) {
+                    found.mean += d;
+                    found.low = min(found.low, d);
+                    found.high = max(found.high, d);
+                    count += 1.0;
+                }
             }
         }
     }
+    found.mean /= max(count, 1.0);
     return found;
 }
 
@@ -58,7 +67,7 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
     workgroupBarrier();
     let pixel = first + 1 + vec2<i32>(local.xy);
     if (all(pixel < size)) {
-        let spread = pixel_spread(pixel, scale);
+        let spread = pixel_spread(pixel, scale, 0.0);
         let at = (local.y + 1u) * 10u + local.x + 1u;
         let here = around[at];
         var edge = spread.low == 0.0 && spread.high > 0.0;
@@ -69,10 +78,15 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
         // What is thinner than a pixel may miss all the places above.
         let slope = abs(around[at + 1u] - around[at - 1u]) + abs(around[at + 10u] - around[at - 10u]);
         edge = edge || spread.high - spread.low > slope + EDGE_STEP * spread.high;
+        // The middle of one surface, or the nearer part where there are several.
+        var surface = spread.mean;
+        if (edge && spread.low < (1.0 - ONE_SURFACE) * spread.high) {
+            surface = pixel_spread(pixel, scale, 0.5 * (spread.low + spread.high)).mean;
+        }
         let middle = (vec2<f32>(pixel) + 0.5) / vec2<f32>(size);
         let mean = textureSampleLevel(fine_color, fine_sampler, middle, 0.0).rgb;
         textureStore(color, pixel, vec4<f32>(mean, select(1.0, 0.0, edge)));
-        textureStore(depth, pixel, vec4<f32>(select(spread.sum / f32(SAMPLES * scale * scale), spread.high, edge)));
+        textureStore(depth, pixel, vec4<f32>(surface));
         atomicMax(&group_nearest, bitcast<u32>(spread.high));
     }
     workgroupBarrier();

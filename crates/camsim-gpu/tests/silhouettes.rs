@@ -294,3 +294,20 @@ fn a_surface_that_fills_the_view_is_not_supersampled() {
     assert_eq!(done.plan.edges, EdgeStage::None);
     assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette supersampling"));
 }
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn resolved_depth_is_that_of_one_surface() {
+    let sequence = sequence(camera(), steady(120.0, 0.0, DVec3::ZERO, DVec3::ZERO), black_ground_and_roof());
+    let engine = engine();
+    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
+    let (_, color, inverse_depth) = session.read_ideal().expect("readable").expect("drawn");
+    // Level surfaces under a camera that looks straight down: 60 and 120 m, nothing in between.
+    for w in &inverse_depth {
+        assert!((w * 60.0 - 1.0).abs() < 1e-5 || (w * 120.0 - 1.0).abs() < 1e-5, "{w}");
+    }
+    // Marked: a line of two or three pixels along the roof's border of 4 * 80 px, corners and the frame's own border apart.
+    let marked = color.chunks_exact(4).filter(|c| c[3] < 1.0).count();
+    assert!((600..1500).contains(&marked), "{marked}");
+}
