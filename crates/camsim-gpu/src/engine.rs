@@ -196,6 +196,9 @@ struct InFlight {
     lod: LodSelection,
 }
 
+/// Geometry, linear R G B A (A is 0 where a silhouette is marked), and inverse depth in 1/m of an ideal frame, row-major.
+pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
+
 /// A finished frame with the plan it was made by.
 #[derive(Debug)]
 pub struct Finished {
@@ -303,7 +306,7 @@ impl Session<'_> {
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.
-    pub fn read_ideal(&self) -> Result<Option<(IdealGeometry, Vec<f32>, Vec<f32>)>, GpuError> {
+    pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
         let target = &self.targets[drawn.target];
         let [width, height] = drawn.ideal.size_px;

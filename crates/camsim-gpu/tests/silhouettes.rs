@@ -311,3 +311,24 @@ fn resolved_depth_is_that_of_one_surface() {
     let marked = color.chunks_exact(4).filter(|c| c[3] < 1.0).count();
     assert!((600..1500).contains(&marked), "{marked}");
 }
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn bytes_do_not_depend_on_the_order_of_frames() {
+    let mut scenario = camera();
+    scenario.camera.shutter = rolling(10.0);
+    let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
+    let engine = engine();
+    let all = |order: [u64; 4]| {
+        let mut session = engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
+        let mut frames = Vec::new();
+        let mut sink = |done: Finished| {
+            frames.push((done.frame.index, done.frame.color_rgba));
+            Ok(())
+        };
+        session.render::<std::convert::Infallible>(order, &mut sink).expect("render");
+        frames.sort_by_key(|frame| frame.0);
+        frames
+    };
+    assert!(all([0, 1, 2, 3]) == all([2, 0, 3, 1]), "order must not matter");
+}
