@@ -37,7 +37,12 @@ struct Frame {
     mono: u32,
     // Depth difference in inverse metres times this is a parallax in ideal pixels over the exposure.
     exposure_travel_px_m: f32,
-    pad0: f32,
+    // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
+    edge_scale: u32,
+    edge_samples: u32,
+    pad0: u32,
+    pad1: u32,
+    pad2: u32,
     // Key camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,

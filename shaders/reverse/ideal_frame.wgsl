@@ -1,7 +1,7 @@
 // Access to the ideal frame: linear colour and reversed depth d = near / z.
 @group(1) @binding(0) var ideal_color: texture_2d<f32>;
 @group(1) @binding(1) var ideal_sampler: sampler;
-@group(1) @binding(2) var ideal_depth: texture_depth_2d;
+@group(1) @binding(2) var ideal_depth: texture_2d<f32>;
 
 // A direction seen from the key camera (any positive scale) to ideal pixels.
 fn ideal_px_from_point(in_key: vec3<f32>) -> vec2<f32> {
@@ -26,10 +26,10 @@ fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
     let t = at - base;
     let b = vec2<i32>(base);
     let top = min(b + 1, vec2<i32>(last));
-    let d00 = textureLoad(ideal_depth, b, 0);
-    let d10 = textureLoad(ideal_depth, vec2<i32>(top.x, b.y), 0);
-    let d01 = textureLoad(ideal_depth, vec2<i32>(b.x, top.y), 0);
-    let d11 = textureLoad(ideal_depth, top, 0);
+    let d00 = textureLoad(ideal_depth, b, 0).x;
+    let d10 = textureLoad(ideal_depth, vec2<i32>(top.x, b.y), 0).x;
+    let d01 = textureLoad(ideal_depth, vec2<i32>(b.x, top.y), 0).x;
+    let d11 = textureLoad(ideal_depth, top, 0).x;
     let low = min(min(d00, d10), min(d01, d11));
     let high = max(max(d00, d10), max(d01, d11));
     let mixed = mix(mix(d00, d10, t.x), mix(d01, d11, t.x), t.y);
@@ -38,9 +38,9 @@ fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
     return InverseDepth(select(nearest, mixed, one_surface) / frame.near_m, (high - low) / frame.near_m);
 }
 
-// Linear colour, bilinear.
-fn ideal_color_at(at_px: vec2<f32>) -> vec3<f32> {
+// Linear colour, bilinear; alpha below 1 where a silhouette is marked.
+fn ideal_color_at(at_px: vec2<f32>) -> vec4<f32> {
     let size = vec2<f32>(textureDimensions(ideal_color));
     let last = vec2<f32>(frame.ideal_size_px) - 1.0;
-    return textureSampleLevel(ideal_color, ideal_sampler, (clamp(at_px, vec2<f32>(0.0), last) + 0.5) / size, 0.0).rgb;
+    return textureSampleLevel(ideal_color, ideal_sampler, (clamp(at_px, vec2<f32>(0.0), last) + 0.5) / size, 0.0);
 }

@@ -7,6 +7,7 @@
 #import <slot:ray>
 #import <slot:temporal_inverse>
 #import <slot:gather>
+#import <slot:edges>
 #import reverse/photometric.wgsl
 #import <slot:emit>
 
@@ -22,13 +23,13 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let weight = vignette_weight(pixel);
-    var gathered = Gathered(vec3<f32>(0.0), true);
+    var gathered = Gathered(vec4<f32>(0.0), true);
     if (weight > 0.0) {
-        gathered = gather(pixel, ray);
+        gathered = gather_edges(pixel, ray, gather(pixel, ray));
     }
     if (!gathered.inside) {
         emit_invalid(pixel);
         return;
     }
-    emit(pixel, ray, photometric(pixel, gathered.color, weight));
+    emit(pixel, ray, photometric(pixel, gathered.color.rgb, weight));
 }

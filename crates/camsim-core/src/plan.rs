@@ -22,11 +22,13 @@ use crate::{
 
 mod bounds;
 mod describe;
+mod edges;
 mod lines;
 mod motion;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
+pub use edges::EdgeStage;
 pub use lines::{LinePoses, line_poses, row_records};
 
 /// Nearest distance that the ideal frame can show, metres.
@@ -157,6 +159,8 @@ pub struct FramePlan {
     pub temporal: TemporalStage,
     /// Gather; `None` is one instant.
     pub blur: Option<BlurStage>,
+    /// Pixels that see a silhouette.
+    pub edges: EdgeStage,
     /// Most footprint taps an axis.
     pub max_taps: u32,
     /// Whether depth and coordinates are wanted beside the picture.
@@ -182,6 +186,7 @@ pub struct Planner {
     shutter: Shutter,
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
+    outline: edges::SceneOutline,
     truth: bool,
     max_side_px: u32,
 }
@@ -200,7 +205,8 @@ impl Planner {
             None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
         };
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
-        Ok(Self { sequence, shutter, zoom, fixed, truth, max_side_px })
+        let outline = edges::SceneOutline::new(&sequence.scene);
+        Ok(Self { sequence, shutter, zoom, fixed, outline, truth, max_side_px })
     }
 
     /// The sequence.
@@ -258,6 +264,8 @@ impl Planner {
         let ray = ray_stage(&reach, &mut skipped);
         let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+        let edges =
+            edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
@@ -273,6 +281,7 @@ impl Planner {
             ray,
             temporal,
             blur,
+            edges,
             max_taps: quality.footprint_taps.value().unwrap_or(4).max(1),
             truth: self.truth,
             motion,

@@ -9,7 +9,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{FramePlan, PlanError, Planner, RayStage, line_poses},
+    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage, line_poses},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -31,6 +31,8 @@ use crate::{
 const FRAMES_IN_FLIGHT: usize = 2;
 /// Ideal targets of different size that are kept.
 const MAX_TARGETS: usize = 4;
+/// The same for supersampled ones, which take 16 times the memory.
+const MAX_FINE_TARGETS: usize = 2;
 
 /// Errors of rendering; `E` is the sink's own.
 #[derive(Debug, thiserror::Error)]
@@ -147,6 +149,7 @@ impl Engine {
 struct Drawn {
     pose: CameraPose,
     ideal: IdealGeometry,
+    edges: EdgeStage,
     target: usize,
     lod: LodSelection,
 }
@@ -196,6 +199,9 @@ struct InFlight {
     submission: wgpu::SubmissionIndex,
     lod: LodSelection,
 }
+
+/// Geometry, linear R G B A (A is 0 where a silhouette is marked), and inverse depth in 1/m of an ideal frame, row-major.
+pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
 
 /// A finished frame with the plan it was made by.
 #[derive(Debug)]
@@ -304,12 +310,12 @@ impl Session<'_> {
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.
-    pub fn read_ideal(&self) -> Result<Option<(IdealGeometry, Vec<f32>, Vec<f32>)>, GpuError> {
+    pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
         let target = &self.targets[drawn.target];
         let [width, height] = drawn.ideal.size_px;
-        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height, wgpu::TextureAspect::All)?;
-        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height, wgpu::TextureAspect::DepthOnly)?;
+        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height)?;
+        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height)?;
         self.engine.check()?;
         let near_m = camsim_core::plan::NEAR_M as f32;
         Ok(Some((drawn.ideal, color.iter().flatten().map(|v| v.to_f32()).collect(), depth.iter().map(|d| d / near_m).collect())))
@@ -368,16 +374,21 @@ impl Session<'_> {
 
     /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
     fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal) {
+        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal && drawn.edges == plan.edges) {
             return;
         }
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(&plan.ideal, gpu.max_side_px());
-        let target = self.targets.iter().position(|target| target.allocated_px == size_px).unwrap_or_else(|| {
-            if self.targets.len() == MAX_TARGETS {
-                self.targets.remove(0);
+        let target = self.targets.iter().position(|target| target.serves(size_px, plan.edges)).unwrap_or_else(|| {
+            let fine = plan.edges != EdgeStage::None;
+            let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
+            let alike = |target: &IdealTarget| target.fine.is_some() == fine;
+            if self.targets.iter().filter(|target| alike(target)).count() >= limit {
+                // `drawn` may name a target behind the oldest, but is replaced below before anybody looks.
+                let oldest = self.targets.iter().position(alike).unwrap_or_default();
+                self.targets.remove(oldest);
             }
-            self.targets.push(IdealTarget::new(gpu, size_px));
+            self.targets.push(IdealTarget::new(gpu, size_px, plan.edges));
             self.targets.len() - 1
         });
         let sequence = self.planner.sequence();
@@ -391,7 +402,7 @@ impl Session<'_> {
             sequence.scenario.quality.max_terrain_error_px,
             &self.targets[target],
         );
-        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, target, lod });
+        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, target, lod });
     }
 
     /// Pass 3: the output frame.
@@ -415,6 +426,7 @@ impl Session<'_> {
             noise_table: &self.noise_table,
             color: &view(&target.color),
             depth: &view(&target.depth),
+            fine: target.fine.as_ref(),
             poses: &slot.poses,
             vignette: &self.vignette,
             lens_map: lens_map.as_ref(),
@@ -472,13 +484,7 @@ fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
         .collect()
 }
 
-fn read_texture<T: bytemuck::Pod>(
-    gpu: &GpuContext,
-    texture: &wgpu::Texture,
-    width: u32,
-    height: u32,
-    aspect: wgpu::TextureAspect,
-) -> Result<Vec<T>, GpuError> {
+fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32) -> Result<Vec<T>, GpuError> {
     let row = width * size_of::<T>() as u32;
     let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     // Depth can only be copied whole.
@@ -492,7 +498,7 @@ fn read_texture<T: bytemuck::Pod>(
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
     encoder.copy_texture_to_buffer(
-        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect },
+        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
         wgpu::TexelCopyBufferInfo {
             buffer: &buffer,
             layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },

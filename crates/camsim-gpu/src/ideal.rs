@@ -1,7 +1,7 @@
 //! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
 
 use camsim_core::{
-    plan::{FramePlan, NEAR_M},
+    plan::{EdgeStage, FramePlan, NEAR_M},
     pose::CameraPose,
     scene::{LodSelection, Scene, select_lod},
     temporal::IdealGeometry,
@@ -14,6 +14,11 @@ use crate::{
     shaders::{self, ComposeError},
     upload::SceneBuffers,
 };
+
+mod fine;
+
+pub use fine::{FINE_SAMPLES, FineTarget};
+use fine::{ResolvePass, scale_of, texture};
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -33,6 +38,8 @@ pub struct IdealTarget {
     pub color: wgpu::Texture,
     /// near / z.
     pub depth: wgpu::Texture,
+    /// Samples that colour and depth are resolved from, for frames with silhouettes.
+    pub fine: Option<FineTarget>,
 }
 
 impl IdealTarget {
@@ -42,31 +49,42 @@ impl IdealTarget {
         ideal.size_px.map(|side| side.next_multiple_of(SIZE_QUANTUM_PX).min(max_side_px))
     }
 
+    /// Whether a frame of this size and edge stage is drawn to it.
+    #[must_use]
+    pub fn serves(&self, allocated_px: [u32; 2], edges: EdgeStage) -> bool {
+        self.allocated_px == allocated_px && self.fine.as_ref().map(|fine| fine.scale) == scale_of(edges)
+    }
+
     /// Allocates.
     #[must_use]
-    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2]) -> Self {
-        let texture = |label, format| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width: allocated_px[0], height: allocated_px[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
+    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], edges: EdgeStage) -> Self {
+        let fine = scale_of(edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
+        // Resolved colour and depth are written by a compute pass.
+        let (depth_format, written) = match fine {
+            Some(_) => (wgpu::TextureFormat::R32Float, wgpu::TextureUsages::STORAGE_BINDING),
+            None => (DEPTH_FORMAT, wgpu::TextureUsages::RENDER_ATTACHMENT),
         };
-        Self { allocated_px, color: texture("camsim.ideal.color", COLOR_FORMAT), depth: texture("camsim.ideal.depth", DEPTH_FORMAT) }
+        let usage = written | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let color = texture(gpu, "camsim.ideal.color", allocated_px, COLOR_FORMAT, 1, usage);
+        let depth = texture(gpu, "camsim.ideal.depth", allocated_px, depth_format, 1, usage);
+        Self { allocated_px, color, depth, fine }
     }
 }
 
 /// Pipelines of the ideal render.
 #[derive(Debug)]
 pub struct IdealPass {
+    resolve: ResolvePass,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
+    plain: SurfacePipelines,
+    fine: SurfacePipelines,
+}
+
+/// What draws surfaces to a target of a given number of samples.
+#[derive(Debug)]
+struct SurfacePipelines {
     terrain: wgpu::RenderPipeline,
     mesh: wgpu::RenderPipeline,
 }
@@ -107,9 +125,14 @@ impl IdealPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
         };
-        let terrain = pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[])?;
-        let mesh = pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices)])?;
-        Ok(Self { camera_layout, terrain_layout, mesh_layout, terrain, mesh })
+        let pipelines = |samples| -> Result<_, ComposeError> {
+            Ok(SurfacePipelines {
+                terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples)?,
+                mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples)?,
+            })
+        };
+        let (plain, fine) = (pipelines(1)?, pipelines(FINE_SAMPLES)?);
+        Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
     }
 
     /// Buffers for one frame in flight of this scene.
@@ -177,15 +200,18 @@ impl IdealPass {
         let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
             select_lod(terrain, &plan.key_pose, plan.tangents(), focal_px, max_terrain_error_px)
         });
-        let color_view = target.color.create_view(&wgpu::TextureViewDescriptor::default());
-        let depth_view = target.depth.create_view(&wgpu::TextureViewDescriptor::default());
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (color_view, depth_view, resolved_view, scale, pipelines) = match &target.fine {
+            None => (view(&target.color), view(&target.depth), None, 1, &self.plain),
+            Some(fine) => (view(&fine.color), fine.depth_view(), Some(view(&fine.averaged)), fine.scale, &self.fine),
+        };
         let [r, g, b] = scene.sky_linear.map(f64::from);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("ideal"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view: &color_view,
                 depth_slice: None,
-                resolve_target: None,
+                resolve_target: resolved_view.as_ref(),
                 ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
@@ -198,12 +224,16 @@ impl IdealPass {
             occlusion_query_set: None,
             multiview_mask: None,
         });
-        let [width, height] = plan.ideal.size_px;
+        let [width, height] = plan.ideal.size_px.map(|side| side * scale);
         pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
         pass.set_scissor_rect(0, 0, width, height);
         pass.set_bind_group(0, &slot.camera_group, &[]);
-        self.draw_terrain(gpu, &mut pass, slot, scene, buffers, &lod, base_ned_m);
-        self.draw_meshes(gpu, &mut pass, slot, buffers, base_ned_m);
+        self.draw_terrain(gpu, &mut pass, pipelines, slot, scene, buffers, &lod, base_ned_m);
+        self.draw_meshes(gpu, &mut pass, pipelines, slot, buffers, base_ned_m);
+        drop(pass);
+        if let Some(fine) = &target.fine {
+            self.resolve.encode(gpu, encoder, plan.ideal.size_px, target, fine);
+        }
         lod
     }
 
@@ -211,6 +241,7 @@ impl IdealPass {
         &self,
         gpu: &GpuContext,
         pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &SurfacePipelines,
         slot: &IdealSlot,
         scene: &Scene,
         buffers: &SceneBuffers,
@@ -236,7 +267,7 @@ impl IdealPass {
             })
             .collect();
         gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
-        pass.set_pipeline(&self.terrain);
+        pass.set_pipeline(&pipelines.terrain);
         pass.set_bind_group(1, group, &[]);
         pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
         let mut first = 0;
@@ -257,11 +288,19 @@ impl IdealPass {
         }
     }
 
-    fn draw_meshes(&self, gpu: &GpuContext, pass: &mut wgpu::RenderPass<'_>, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
+    fn draw_meshes(
+        &self,
+        gpu: &GpuContext,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipelines: &SurfacePipelines,
+        slot: &IdealSlot,
+        buffers: &SceneBuffers,
+        base_ned_m: DVec3,
+    ) {
         if buffers.meshes.is_empty() {
             return;
         }
-        pass.set_pipeline(&self.mesh);
+        pass.set_pipeline(&pipelines.mesh);
         for ((mesh, group), i) in buffers.meshes.iter().zip(&slot.mesh_groups).zip(0_u64..) {
             let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
             gpu.queue.write_buffer(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
@@ -318,6 +357,7 @@ fn pipeline(
     file: &str,
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
+    samples: u32,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
     let module = shaders::module(&gpu.device, file, file, &[])?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
@@ -344,7 +384,7 @@ fn pipeline(
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
         }),
-        multisample: wgpu::MultisampleState::default(),
+        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: &module,
             entry_point: Some("fragment"),

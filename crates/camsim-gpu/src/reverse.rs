@@ -3,11 +3,11 @@
 //! One fused compute kernel, composed of one file a stage; what a frame does not need is not in its text. [`PipelineKey::all`] lists
 //! every legal composition.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 
 use camsim_core::{
     photometric::is_mono,
-    plan::{FramePlan, NEAR_M, RayStage, TemporalStage, table_shape},
+    plan::{EdgeStage, FramePlan, NEAR_M, RayStage, TemporalStage, table_shape},
     scenario::Scenario,
     shutter::LinesAxis,
 };
@@ -15,6 +15,7 @@ use glam::DMat3;
 
 use crate::{
     context::GpuContext,
+    ideal::FineTarget,
     layout::FrameUniforms,
     shaders::{self, ComposeError, Slot},
 };
@@ -44,6 +45,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
+    /// Rays of their own at silhouettes.
+    pub edges: bool,
     /// Depth and coordinates beside the picture.
     pub truth: bool,
 }
@@ -57,7 +60,7 @@ impl PipelineKey {
             TemporalStage::Rotation => TemporalKind::Rotation,
             TemporalStage::Reproject { .. } => TemporalKind::Reproject,
         };
-        Self { ray: plan.ray, temporal, blur: plan.blur.is_some(), truth: plan.truth }
+        Self { ray: plan.ray, temporal, blur: plan.blur.is_some(), edges: plan.edges != EdgeStage::None, truth: plan.truth }
     }
 
     /// Every key that a plan can have.
@@ -71,7 +74,9 @@ impl PipelineKey {
                     if blur && temporal == TemporalKind::Identity {
                         continue;
                     }
-                    keys.extend([false, true].map(|truth| Self { ray, temporal, blur, truth }));
+                    for edges in [false, true] {
+                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, edges, truth }));
+                    }
                 }
             }
         }
@@ -80,7 +85,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 4] {
+    pub fn slots(&self) -> [Slot; 5] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -91,8 +96,9 @@ impl PipelineKey {
             TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
         };
         let gather = if self.blur { "reverse/gather/blur.wgsl" } else { "reverse/gather/sharp.wgsl" };
+        let edges = if self.edges { "reverse/edges/supersampled.wgsl" } else { "reverse/edges/none.wgsl" };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
-        [("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("emit", emit)]
+        [("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("edges", edges), ("emit", emit)]
     }
 }
 
@@ -107,6 +113,8 @@ pub struct ReverseBindings<'a> {
     pub color: &'a wgpu::TextureView,
     /// Ideal depth.
     pub depth: &'a wgpu::TextureView,
+    /// The ideal frame's samples, when the key reads them.
+    pub fine: Option<&'a FineTarget>,
     /// Relative poses.
     pub poses: &'a wgpu::Buffer,
     /// Vignette weights.
@@ -157,11 +165,10 @@ impl ReversePass {
         size_px: [u32; 2],
         bindings: &ReverseBindings<'_>,
     ) -> Result<(), ComposeError> {
-        if !self.variants.contains_key(&key) {
-            let variant = Variant::new(gpu, key)?;
-            self.variants.insert(key, variant);
-        }
-        let variant = &self.variants[&key];
+        let variant = match self.variants.entry(key) {
+            Entry::Occupied(compiled) => compiled.into_mut(),
+            Entry::Vacant(first_use) => first_use.insert(Variant::new(gpu, key)?),
+        };
         let groups = variant.bind(gpu, &self.sampler, bindings);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("reverse"), timestamp_writes: None });
         pass.set_pipeline(&variant.pipeline);
@@ -213,6 +220,10 @@ impl Variant {
             Vec::new(),
             vec![(0, b.out_color.as_entire_binding())],
         ];
+        let fine = b.fine.map(|fine| (fine.color.create_view(&wgpu::TextureViewDescriptor::default()), fine.depth_view(), &fine.nearest));
+        if let Some((color, depth, nearest)) = &fine {
+            resources[1].extend([(5, view(color)), (6, view(depth)), (7, nearest.as_entire_binding())]);
+        }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
         let mut groups = [const { None }; 4];
@@ -233,13 +244,22 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let texture =
         |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
     let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, storage(true))];
-    let ideal = vec![
+    let mut ideal = vec![
         entry(0, texture(wgpu::TextureSampleType::Float { filterable: true })),
         entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-        entry(2, texture(wgpu::TextureSampleType::Depth)),
+        entry(2, texture(wgpu::TextureSampleType::Float { filterable: false })),
         entry(3, storage(true)),
         entry(4, storage(true)),
     ];
+    if key.edges {
+        let samples =
+            |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: true };
+        ideal.extend([
+            entry(5, samples(wgpu::TextureSampleType::Float { filterable: false })),
+            entry(6, samples(wgpu::TextureSampleType::Depth)),
+            entry(7, storage(true)),
+        ]);
+    }
     let lens = match key.ray {
         RayStage::Pinhole => Vec::new(),
         RayStage::LensMap => vec![entry(0, texture(wgpu::TextureSampleType::Float { filterable: false }))],
@@ -258,6 +278,10 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
+    let (edge_scale, edge_samples) = match plan.edges {
+        EdgeStage::None => (1, 0),
+        EdgeStage::Supersampled { scale, samples } => (scale, samples),
+    };
     FrameUniforms {
         size_px: plan.camera.size_px,
         ideal_size_px: plan.ideal.size_px,
@@ -288,6 +312,8 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         ned_from_key_x: column(0),
         ned_from_key_y: column(1),
         ned_from_key_z: column(2),
+        edge_scale,
+        edge_samples,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
         ..FrameUniforms::default()
     }
@@ -302,12 +328,13 @@ mod tests {
     #[test]
     fn every_variant_is_valid_without_any_capability() {
         let texts = PipelineKey::all().into_iter().map(|key| (format!("{key:?}"), shaders::compose(SHADER, &key.slots()).unwrap()));
-        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
+        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl", "ideal/resolve.wgsl"]
+            .map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
         for (name, text) in texts.chain(ideal) {
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 20);
+        assert_eq!(PipelineKey::all().len(), 40);
     }
 }

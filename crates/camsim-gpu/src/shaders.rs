@@ -16,9 +16,13 @@ macro_rules! embedded {
 embedded![
     "common/frame.wgsl",
     "common/noise.wgsl",
+    "ideal/fine.wgsl",
     "ideal/mesh.wgsl",
+    "ideal/resolve.wgsl",
     "ideal/surface.wgsl",
     "ideal/terrain.wgsl",
+    "reverse/edges/none.wgsl",
+    "reverse/edges/supersampled.wgsl",
     "reverse/emit/color.wgsl",
     "reverse/emit/truth.wgsl",
     "reverse/gather/blur.wgsl",

@@ -17,7 +17,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let taps = area.taps.x * area.taps.y;
     let segments = frame.nodes - 1u;
     let at_least = (taps + segments - 1u) / segments;
-    var sum = vec3<f32>(0.0);
+    var sum = vec4<f32>(0.0);
     var inside = true;
     var tap = 0u;
     var pose = pose_at_node(pixel, 0u);
@@ -28,7 +28,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
         inside = inside && source.inside && next.inside;
         let count = samples_for(distance(source.at_px, next.at_px), at_least);
         let edge = max(source.spread, next.spread) * frame.exposure_travel_px_m > EDGE_PARALLAX_PX;
-        var part = vec3<f32>(0.0);
+        var part = vec4<f32>(0.0);
         for (var i = 0u; i < count; i++) {
             let t = (f32(i) + 0.5) / f32(count);
             var at_px = mix(source.at_px, next.at_px, t);

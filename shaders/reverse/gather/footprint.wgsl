@@ -1,6 +1,7 @@
 // Area of an output pixel in the ideal frame: a grid of taps where the lens minifies.
 struct Gathered {
-    color: vec3<f32>,
+    // Linear R G B; alpha is 1, or less where the samples met a silhouette.
+    color: vec4<f32>,
     inside: bool,
 }
 

@@ -5,7 +5,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let source = temporal_inverse(ray.uv, pose_mid(pixel));
     let area = footprint(ray);
     let taps = area.taps.x * area.taps.y;
-    var sum = vec3<f32>(0.0);
+    var sum = vec4<f32>(0.0);
     for (var i = 0u; i < taps; i++) {
         sum += ideal_color_at(source.at_px + tap_offset_px(area, i));
     }

@@ -28,3 +28,15 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
     return temporal_inverse(uv, pose);
 }
+
+const HAS_PARALLAX: bool = true;
+
+// The point at inverse planar depth w of a ray, in the key camera, times w.
+fn point_at(uv: vec2<f32>, pose: Pose, w: f32) -> vec3<f32> {
+    return rotate(pose, vec3<f32>(uv, 1.0)) + w * translation(pose);
+}
+
+// The inverse depth that the line's own camera gives to what the key camera sees at `in_key` (1/m) where the ray looks.
+fn line_inverse_depth(uv: vec2<f32>, pose: Pose, in_key: f32) -> f32 {
+    return in_key * rotate(pose, vec3<f32>(uv, 1.0)).z / max(1.0 - translation(pose).z * in_key, 1e-3);
+}

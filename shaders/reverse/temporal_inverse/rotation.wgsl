@@ -13,3 +13,14 @@ fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
     source.inverse_depth = inverse_depth(source.at_px).value * rotate(pose, vec3<f32>(uv, 1.0)).z;
     return source;
 }
+
+// Depth does not matter: every point of a ray has the same source.
+const HAS_PARALLAX: bool = false;
+
+fn point_at(uv: vec2<f32>, pose: Pose, w: f32) -> vec3<f32> {
+    return rotate(pose, vec3<f32>(uv, 1.0));
+}
+
+fn line_inverse_depth(uv: vec2<f32>, pose: Pose, in_key: f32) -> f32 {
+    return in_key;
+}

@@ -36,10 +36,10 @@ impl LensReach {
             let of_band: Vec<_> = candidates.iter().filter(|(_, pixel)| band_of(*pixel, camera.size_px) == band).collect();
             for k in 0..DIRECTIONS {
                 let direction = DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / f64::from(DIRECTIONS));
-                if let Some(&&outermost) = of_band.iter().max_by(|a, b| a.0.dot(direction).total_cmp(&b.0.dot(direction))) {
-                    if !rays.contains(&outermost) {
-                        rays.push(outermost);
-                    }
+                if let Some(&&outermost) = of_band.iter().max_by(|a, b| a.0.dot(direction).total_cmp(&b.0.dot(direction)))
+                    && !rays.contains(&outermost)
+                {
+                    rays.push(outermost);
                 }
             }
         }

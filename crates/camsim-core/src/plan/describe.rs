@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
+use super::{BlurStage, EdgeStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
 
 /// The plan's figures, ready to serialise.
 #[derive(Clone, Debug, Serialize)]
@@ -37,6 +37,8 @@ pub struct PlanSummary<'a> {
     pub temporal: TemporalStage,
     /// Gather.
     pub blur: Option<BlurStage>,
+    /// Pixels that see a silhouette.
+    pub edges: EdgeStage,
     /// Most footprint taps an axis.
     pub max_footprint_taps: u32,
     /// Bounds behind the choices.
@@ -54,7 +56,21 @@ impl FramePlan {
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
-        passes.push(format!("ideal: {width}x{height} px rgba16float + depth32float (reversed)"));
+        let rays = match self.edges {
+            EdgeStage::None => {
+                passes.push(format!("ideal: {width}x{height} px rgba16float + depth32float (reversed)"));
+                String::new()
+            }
+            EdgeStage::Supersampled { scale, samples } => {
+                passes.push(format!(
+                    "ideal: {}x{} px rgba16float + depth32float (reversed), 4 samples each",
+                    width * scale,
+                    height * scale
+                ));
+                passes.push(format!("resolve: {width}x{height} px of colour and depth, silhouettes marked"));
+                format!(", {samples} rays a pixel at silhouettes")
+            }
+        };
         let ray = if self.ray == RayStage::LensMap { "lens map" } else { "pinhole ray" };
         let temporal = match self.temporal {
             TemporalStage::Identity => "no motion".to_owned(),
@@ -66,7 +82,7 @@ impl FramePlan {
             Some(blur) => format!("blur with {} nodes, {} samples a px", blur.nodes, blur.samples_per_px),
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
-        passes.push(format!("reverse: {ray} -> {temporal} -> {gather} -> photometric{truth}"));
+        passes.push(format!("reverse: {ray} -> {temporal} -> {gather}{rays} -> photometric{truth}"));
         passes.push("readback".to_owned());
         passes
     }
@@ -89,6 +105,7 @@ impl FramePlan {
             ray: self.ray,
             temporal: self.temporal,
             blur: self.blur,
+            edges: self.edges,
             max_footprint_taps: self.max_taps,
             motion: self.motion,
             skipped: &self.skipped,

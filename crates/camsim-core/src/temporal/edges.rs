@@ -1,0 +1,241 @@
+//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the one sample of a supersampled ideal
+//! frame that it meets. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::IdealGeometry;
+
+/// Golden ratio: its multiples are even over an interval for any number of them.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Distance of two looks along the parallax of a ray, ideal pixels, while they are no more than [`MAX_LOOKS`].
+const LOOK_PX: f64 = 0.5;
+const MAX_LOOKS: f64 = 64.0;
+/// Fixed-point steps from each look.
+const LOOK_STEPS: u32 = 4;
+/// A depth that gives itself again to within this, ideal pixels of parallax, is where the ray meets a surface.
+const MEETS_PX: f64 = 0.05;
+/// A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
+const EDGE_STEP: f64 = 0.01;
+
+/// One of the four samples of a fine pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FineSample {
+    /// Inverse planar depth in the key camera, 1/m, 0 = sky.
+    pub inverse_depth: f64,
+    /// Linear R G B.
+    pub color: DVec3,
+}
+
+/// A supersampled ideal frame: `scale` fine pixels along a side of an ideal pixel, four samples each.
+#[derive(Clone, Copy, Debug)]
+pub struct FineImage<'a> {
+    /// Ideal width, height.
+    pub size_px: [u32; 2],
+    /// Fine pixels along a side of an ideal pixel.
+    pub scale: u32,
+    /// Row-major fine pixels, four samples each, in the order of [`FineImage::SAMPLE_PLACES`].
+    pub samples: &'a [FineSample],
+}
+
+impl FineImage<'_> {
+    /// Standard places of the samples, fine pixels from the fine pixel's top-left corner: one in each quarter, in the order of quarters.
+    pub const SAMPLE_PLACES: [DVec2; 4] =
+        [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
+
+    /// The sample of the quarter of a fine pixel that holds a position; positions outside go to the border.
+    #[must_use]
+    pub fn at(&self, at_px: DVec2) -> FineSample {
+        let [width, height] = self.size_px.map(f64::from);
+        let last = DVec2::new(width, height) - 1e-3;
+        let at = (at_px + 0.5).clamp(DVec2::ZERO, last) * f64::from(self.scale);
+        let texel = at.floor();
+        let quarter = (2.0 * (at - texel)).floor();
+        let index = texel.y as usize * (self.size_px[0] * self.scale) as usize + texel.x as usize;
+        self.samples[4 * index + (quarter.x + 2.0 * quarter.y) as usize]
+    }
+}
+
+/// Along one direction: a second difference of inverse depth beyond what a smooth surface has (a plane has none), or sky beside a surface.
+#[must_use]
+pub fn steps(before: f64, here: f64, after: f64) -> bool {
+    let high = before.max(here).max(after);
+    let low = before.min(here).min(after);
+    (before - 2.0 * here + after).abs() > EDGE_STEP * high || (low == 0.0 && high > 0.0)
+}
+
+/// Ray `i` of `count` (a power of two): place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
+#[must_use]
+pub fn ray_place(i: u32, count: u32) -> (DVec2, f64) {
+    let step = 1.0 / f64::from(count);
+    let x = (f64::from(i) + 0.5) * step;
+    let y = f64::from(i.reverse_bits() >> 8) / 16_777_216.0 + 0.5 * step;
+    (DVec2::new(x, y) - 0.5, (GOLDEN * (f64::from(i) + 0.5)).fract())
+}
+
+/// Where a ray first meets a surface of the ideal frame, ideal pixels. The ray's points, from the nearest surface of all (`w_near`, 1/m)
+/// to infinity, lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several
+/// the nearest counts. If there is none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
+#[must_use]
+pub fn first_surface_px(uv: DVec2, key_from_line: (DMat3, DVec3), w_near: f64, image: &FineImage<'_>, ideal: &IdealGeometry) -> DVec2 {
+    let (rotation, shift) = key_from_line;
+    let direction = rotation * uv.extend(1.0);
+    let place = |w: f64| ideal.px_from_point(direction + w * shift);
+    let far_px = place(0.0);
+    let length_px = place(w_near).distance(far_px);
+    let px_per_w = length_px / w_near.max(1e-12);
+    if length_px < 0.1 * MEETS_PX {
+        return far_px;
+    }
+    let looks = (length_px / LOOK_PX).ceil().clamp(1.0, MAX_LOOKS) as u32;
+    let mut met: Option<(f64, DVec2)> = None;
+    let mut farthest = (f64::INFINITY, far_px);
+    for i in 0..=looks {
+        let mut w = w_near * (1.0 - f64::from(i) / f64::from(looks));
+        if met.is_some_and(|(met, _)| w <= met) {
+            break;
+        }
+        for _ in 0..LOOK_STEPS {
+            let at_px = place(w);
+            let in_key = image.at(at_px).inverse_depth;
+            let found = in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
+            if found < farthest.0 {
+                farthest = (found, at_px);
+            }
+            if (found - w).abs() * px_per_w < MEETS_PX {
+                if met.is_none_or(|(met, _)| found > met) {
+                    met = Some((found, at_px));
+                }
+                break;
+            }
+            w = found;
+        }
+    }
+    met.unwrap_or(farthest).1
+}
+
+/// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and over the exposure, whose
+/// poses are `nodes`, equally far apart in time.
+#[must_use]
+pub fn gather_edges(
+    uv: DVec2,
+    d_uv: [DVec2; 2],
+    nodes: &[(DMat3, DVec3)],
+    count: u32,
+    w_near: f64,
+    image: &FineImage<'_>,
+    ideal: &IdealGeometry,
+) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for i in 0..count {
+        let (place, share) = ray_place(i, count);
+        let along = share * nodes.len().saturating_sub(1) as f64;
+        let node = (along as usize).min(nodes.len().saturating_sub(2));
+        let (Some(&a), b) = (nodes.get(node), nodes.get(node + 1)) else { continue };
+        let pose = b.map_or(a, |b| {
+            let t = along - node as f64;
+            (a.0 * (1.0 - t) + b.0 * t, a.1.lerp(b.1, t))
+        });
+        let ray = uv + place.x * d_uv[0] + place.y * d_uv[1];
+        sum += image.at(first_surface_px(ray, pose, w_near, image, ideal)).color;
+    }
+    sum / f64::from(count.max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IDEAL: IdealGeometry = IdealGeometry { size_px: [80, 20], focal_px: DVec2::splat(60.0), principal_px: DVec2::new(39.5, 9.5) };
+    const ROOF: f64 = 1.0 / 20.0;
+    const GROUND: f64 = 1.0 / 60.0;
+
+    /// A white roof to the left of the plane x = 0, 20 m before the camera, over black ground 60 m before it.
+    fn image(scale: u32) -> Vec<FineSample> {
+        let [width, height] = IDEAL.size_px.map(|side| side * scale);
+        let fine_pixels = (0..width * height).map(|i| DVec2::new(f64::from(i % width), f64::from(i / width)));
+        fine_pixels
+            .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5))
+            .map(|at_px| {
+                let roof = at_px.x < IDEAL.principal_px.x;
+                FineSample { inverse_depth: if roof { ROOF } else { GROUND }, color: if roof { DVec3::ONE } else { DVec3::ZERO } }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn rays_meet_the_nearest_surface_and_holes_show_the_farther_one() {
+        let samples = image(2);
+        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples };
+        for shift_m in [-1.5, -0.4, -0.02, 0.0, 0.02, 0.4, 1.5] {
+            let pose = (DMat3::IDENTITY, DVec3::new(shift_m, 0.0, 0.0));
+            for k in -400..=400 {
+                let u = f64::from(k) * 1e-3;
+                // From x = shift, the roof's border at x = 0 and 20 m is seen at u = -shift / 20.
+                let border_px = (u + shift_m * ROOF) * IDEAL.focal_px.x;
+                // Samples stand up to a quarter of a pixel from where the ray asks.
+                if border_px.abs() < 0.3 {
+                    continue;
+                }
+                let at_px = first_surface_px(DVec2::new(u, 0.01), pose, 1.02 * ROOF, &image, &IDEAL);
+                let seen = image.at(at_px);
+                let roof = border_px < 0.0;
+                assert_eq!(seen.inverse_depth, if roof { ROOF } else { GROUND }, "shift {shift_m}, u {u}: {at_px}");
+                let exact_px = (u + shift_m * seen.inverse_depth) * IDEAL.focal_px.x + IDEAL.principal_px.x;
+                let hidden = !roof && exact_px < IDEAL.principal_px.x + 0.3;
+                assert!(hidden || (at_px.x - exact_px).abs() <= MEETS_PX, "shift {shift_m}, u {u}: {at_px} {exact_px}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pixel_across_a_border_gets_its_share() {
+        let samples = image(2);
+        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples };
+        let pixel = 1.0 / IDEAL.focal_px.x;
+        let still = [(DMat3::IDENTITY, DVec3::ZERO)];
+        for tenth in -5..=5 {
+            let uv = DVec2::new(f64::from(tenth) * 0.1 * pixel, 0.0);
+            let found = gather_edges(uv, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &still, 64, 1.02 * ROOF, &image, &IDEAL);
+            let share = 0.5 - f64::from(tenth) * 0.1;
+            // Eight columns of samples a pixel.
+            assert!((found.x - share).abs() < 0.13, "{tenth}: {found} {share}");
+        }
+        // The border runs over two pixels within the exposure.
+        let moving = [-1.0, 1.0].map(|px| (DMat3::IDENTITY, DVec3::new(px * pixel / ROOF, 0.0, 0.0)));
+        let found = gather_edges(DVec2::ZERO, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &moving, 64, 1.02 * ROOF, &image, &IDEAL);
+        assert!((found.x - 0.5).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn rays_are_even_over_area_and_time() {
+        for count in [16, 32, 64, 256] {
+            let places: Vec<_> = (0..count).map(|i| ray_place(i, count)).collect();
+            for of in [|p: &(DVec2, f64)| p.0.x + 0.5, |p: &(DVec2, f64)| p.0.y + 0.5, |p: &(DVec2, f64)| p.1] {
+                let mut values: Vec<f64> = places.iter().map(of).collect();
+                values.sort_by(f64::total_cmp);
+                for (k, value) in values.iter().enumerate() {
+                    let even = (k as f64 + 0.5) / f64::from(count);
+                    assert!((0.0..1.0).contains(value) && (value - even).abs() < 2.0 / f64::from(count), "{count}: {value} {even}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn planes_have_no_steps() {
+        assert!(!steps(0.001, 0.011, 0.021) && !steps(0.0, 0.0, 0.0));
+        assert!(steps(0.01, 0.01, 0.02) && steps(0.0, 0.0, 0.01) && steps(0.01, 0.01, 0.0));
+        // No depth is no step and no panic.
+        assert!(!steps(f64::NAN, f64::NAN, f64::NAN));
+    }
+
+    #[test]
+    fn a_ray_that_is_not_a_number_has_some_place() {
+        let samples = image(1);
+        let image = FineImage { size_px: IDEAL.size_px, scale: 1, samples: &samples };
+        for uv in [DVec2::NAN, DVec2::splat(f64::INFINITY), DVec2::splat(1e300)] {
+            let at_px = first_surface_px(uv, (DMat3::IDENTITY, DVec3::splat(0.5)), 1.02 * ROOF, &image, &IDEAL);
+            let _ = image.at(at_px);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Supersampled ideal frames: their textures, and the pass that resolves them to one colour and depth a pixel.
+
+use camsim_core::plan::EdgeStage;
+
+use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget};
+use crate::{
+    context::GpuContext,
+    shaders::{self, ComposeError},
+};
+
+/// Samples of a fine pixel; every adapter has 4, at the standard places.
+pub const FINE_SAMPLES: u32 = 4;
+/// Edge of the square workgroups.
+const WORKGROUP_PX: u32 = 8;
+
+/// Textures that a supersampled ideal frame is drawn to.
+#[derive(Debug)]
+pub struct FineTarget {
+    /// Fine pixels along a side of an ideal pixel.
+    pub scale: u32,
+    /// Linear colour, 4 samples a fine pixel.
+    pub color: wgpu::Texture,
+    /// near / z, 4 samples a fine pixel.
+    pub depth: wgpu::Texture,
+    /// Mean colour of each fine pixel.
+    pub averaged: wgpu::Texture,
+    /// One u32: the bits of the frame's largest near / z.
+    pub nearest: wgpu::Buffer,
+}
+
+/// Fine pixels along a side of an ideal pixel, for frames that need any.
+pub(super) fn scale_of(edges: EdgeStage) -> Option<u32> {
+    match edges {
+        EdgeStage::None => None,
+        EdgeStage::Supersampled { scale, .. } => Some(scale),
+    }
+}
+
+pub(super) fn texture(
+    gpu: &GpuContext,
+    label: &str,
+    size_px: [u32; 2],
+    format: wgpu::TextureFormat,
+    samples: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: samples,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}
+
+impl FineTarget {
+    pub(super) fn new(gpu: &GpuContext, ideal_px: [u32; 2], scale: u32) -> Self {
+        let size_px = ideal_px.map(|side| side * scale);
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+        let nearest = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camsim.ideal.nearest"),
+            size: 4,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        Self {
+            scale,
+            color: texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage),
+            depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
+            averaged: texture(gpu, "camsim.ideal.averaged_color", size_px, COLOR_FORMAT, 1, usage),
+            nearest,
+        }
+    }
+
+    /// The depth samples.
+    #[must_use]
+    pub fn depth_view(&self) -> wgpu::TextureView {
+        self.depth.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+}
+
+/// Samples to pixels, and the mark of silhouettes.
+#[derive(Debug)]
+pub(super) struct ResolvePass {
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
+    sampler: wgpu::Sampler,
+}
+
+impl ResolvePass {
+    pub(super) fn new(gpu: &GpuContext) -> Result<Self, ComposeError> {
+        let device = &gpu.device;
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
+        let view_dimension = wgpu::TextureViewDimension::D2;
+        let read = |sample_type, multisampled| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
+        let write = |format| wgpu::BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension };
+        let nearest = wgpu::BufferBindingType::Storage { read_only: false };
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("camsim.ideal.resolve"),
+            entries: &[
+                entry(0, read(wgpu::TextureSampleType::Depth, true)),
+                entry(1, read(wgpu::TextureSampleType::Float { filterable: true }, false)),
+                entry(2, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
+                entry(3, write(COLOR_FORMAT)),
+                entry(4, write(wgpu::TextureFormat::R32Float)),
+                entry(5, wgpu::BindingType::Buffer { ty: nearest, has_dynamic_offset: false, min_binding_size: None }),
+            ],
+        });
+        let module = shaders::module(device, "camsim.ideal.resolve", "ideal/resolve.wgsl", &[])?;
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("camsim.ideal.resolve"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some("camsim.ideal.resolve"),
+            layout: Some(&pipeline_layout),
+            module: &module,
+            entry_point: Some("resolve"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            cache: None,
+        });
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("camsim.ideal.resolve"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        Ok(Self { layout, pipeline, sampler })
+    }
+
+    /// Records the resolve of `size_px` ideal pixels.
+    pub(super) fn encode(
+        &self,
+        gpu: &GpuContext,
+        encoder: &mut wgpu::CommandEncoder,
+        size_px: [u32; 2],
+        target: &IdealTarget,
+        fine: &FineTarget,
+    ) {
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (depth_samples, averaged, color, depth) = (fine.depth_view(), view(&fine.averaged), view(&target.color), view(&target.depth));
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("camsim.ideal.resolve"),
+            layout: &self.layout,
+            entries: &[
+                entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
+                entry(1, wgpu::BindingResource::TextureView(&averaged)),
+                entry(2, wgpu::BindingResource::Sampler(&self.sampler)),
+                entry(3, wgpu::BindingResource::TextureView(&color)),
+                entry(4, wgpu::BindingResource::TextureView(&depth)),
+                entry(5, fine.nearest.as_entire_binding()),
+            ],
+        });
+        encoder.clear_buffer(&fine.nearest, 0, None);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("resolve"), timestamp_writes: None });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
+    }
+}
