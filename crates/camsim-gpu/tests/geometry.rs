@@ -24,7 +24,7 @@ fn closed_form(plan: &FramePlan, path: &CameraPath, [x, y]: [u32; 2], phase: f64
     let pose = path.pose(t_s);
     let ray_ned = pose.ned_from_camera * uv.extend(1.0);
     let depth_m = -pose.position_ned_m.z / ray_ned.z;
-    if !(depth_m > 0.0) {
+    if depth_m <= 0.0 {
         return None;
     }
     let hit = pose.position_ned_m + depth_m * ray_ned;

@@ -8,7 +8,7 @@ use camsim_core::{
     noise::tail_table,
     photometric::{photometric, vignette_weights},
     plan::{RayStage, TemporalStage, line_poses},
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, ZoomSpec},
     sequence::{GrayImage, Sequence},
     temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, gather, reproject},
 };
@@ -46,7 +46,12 @@ fn render_with_ideal(sequence: &Arc<Sequence>, channels: &[Channel]) -> (camsim_
     let engine = engine();
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     let mut found = None;
-    session.render::<Infallible>([0], &mut |finished| Ok(found = Some(finished))).expect("render");
+    session
+        .render::<Infallible>([0], &mut |finished| {
+            found = Some(finished);
+            Ok(())
+        })
+        .expect("render");
     let (geometry, color, depth) = session.read_ideal().expect("readable").expect("drawn");
     (found.expect("one frame"), Ideal { geometry, color, depth })
 }
@@ -165,26 +170,42 @@ fn photometric_agrees_with_its_twin() {
     }
 }
 
+/// Frames 0..5 of a sequence rendered in some order by one session, sorted.
+fn frames_in_order(sequence: &Arc<Sequence>, order: &[u64]) -> Vec<camsim_core::frame::RenderedFrame> {
+    let engine = engine();
+    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
+    let mut frames = Vec::new();
+    let mut keep = |finished: camsim_gpu::engine::Finished| {
+        frames.push(finished.frame);
+        Ok(())
+    };
+    session.render::<Infallible>(order.iter().copied(), &mut keep).expect("render");
+    frames.sort_by_key(|frame| frame.index);
+    frames
+}
+
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn bytes_are_the_same_twice_and_in_any_order() {
-    let mut scenario = moving_scenario();
-    scenario.camera.photometric.noise_sigma = 0.02;
-    let sequence = sequence(scenario, steady(200.0, 30.0, EAST, TURN), pattern(6000.0));
-    let engine = engine();
-    let all = |order: &[u64]| {
-        let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
-        let mut frames = Vec::new();
-        session
-            .render::<Infallible>(order.iter().copied(), &mut |f| Ok(frames.push((f.frame.index, f.frame.color_rgba, f.frame.coords))))
-            .expect("render");
-        frames.sort_by_key(|f| f.0);
-        frames
-    };
-    let forwards = all(&[0, 1, 2, 3, 4]);
-    assert!(forwards == all(&[3, 0, 4, 2, 1]), "order must not matter");
-    assert!(forwards == all(&[0, 1, 2, 3, 4]), "twice must be the same");
-    assert!(forwards[0].1 != forwards[1].1);
+    let mut fixed = moving_scenario();
+    fixed.camera.photometric.noise_sigma = 0.02;
+    let mut zooming = fixed.clone();
+    let entry =
+        |at: f64, focal_px: f64, k1: f64| ZoomSpec { at, focal_px: [focal_px; 2], principal_point_px: None, coefficients: vec![k1, 0.05] };
+    zooming.camera.zoom = vec![entry(1.0, 160.0, -0.3), entry(2.0, 300.0, -0.1)];
+    for (name, scenario) in [("fixed lens", fixed), ("zoom lens", zooming)] {
+        let mut sequence = Arc::unwrap_or_clone(sequence(scenario, steady(200.0, 30.0, EAST, TURN), pattern(6000.0)));
+        sequence.zoom_track = vec![(0.0, 1.0), (0.2, 2.0)];
+        let sequence = Arc::new(sequence);
+        let bits = |order: &[u64]| {
+            let frames = frames_in_order(&sequence, order);
+            frames.into_iter().map(|f| (f.color_rgba, f.coords)).collect::<Vec<_>>()
+        };
+        let forwards = bits(&[0, 1, 2, 3, 4]);
+        assert!(forwards == bits(&[3, 0, 4, 2, 1]), "{name}: order must not matter");
+        assert!(forwards == bits(&[0, 1, 2, 3, 4]), "{name}: twice must be the same");
+        assert!(forwards[0] != forwards[1], "{name}: frames differ");
+    }
 }
 
 #[test]

@@ -145,15 +145,16 @@ fn load_scene(scenario: &Scenario, log: &FlightLog, shift_terrain: bool) -> Resu
     Ok((scene, summary))
 }
 
-/// Start (path time) and number of frames: frame i counts while its stamp is inside the half-open window.
+/// Start (path time) and number of frames: frame i counts while its stamp is inside the window.
 fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), LoadError> {
     let speed = scenario.flight.speed;
     let last_s = log.rows.last().map_or(0.0, |row| row.t_s);
     let [start_s, end_s] = scenario.flight.window_s.map_or([0.0, last_s], |window| window.map(|t| t / speed));
     let camera = &scenario.camera;
-    // A log of one row is a still camera: one frame unless a window says more.
-    let still = scenario.flight.window_s.is_none() && log.rows.len() == 1;
-    let count = ((end_s - start_s) * camera.fps - camera.phase - 1e-9).ceil().max(if still { 1.0 } else { 0.0 });
+    // Without a window the whole log is flown, its last instant included (a log of one row is a still camera: one frame); an explicit
+    // window is half-open, so that [0, 20] at 30 frames a second holds 600 frames.
+    let periods = (end_s - start_s) * camera.fps - camera.phase;
+    let count = if scenario.flight.window_s.is_none() { (periods + 1e-9).floor() + 1.0 } else { (periods - 1e-9).ceil() };
     if count < 1.0 {
         return Err(LoadError::NoFrame(start_s * speed, end_s * speed, camera.fps));
     }

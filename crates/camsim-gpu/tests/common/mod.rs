@@ -102,7 +102,12 @@ pub fn render_at_phase(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Ch
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     session.set_coords_phase(phase);
     let mut found = None;
-    session.render::<Infallible>([frame], &mut |finished| Ok(found = Some(finished))).expect("render");
+    session
+        .render::<Infallible>([frame], &mut |finished| {
+            found = Some(finished);
+            Ok(())
+        })
+        .expect("render");
     found.expect("one frame")
 }
 
