@@ -2,7 +2,8 @@
 //!
 //! A machine is never quite idle, so what is compared is measured in turn: each round renders the same few frames with every variant,
 //! and a stage's cost is the median over the rounds of the difference to the full camera *in the same round*. A time a frame is that of
-//! a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it, files are not.
+//! a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it, files are not. On Linux the time
+//! that this program's threads had a processor stands beside it: with a software adapter that is the work itself, whatever else runs.
 //!
 //! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
@@ -23,9 +24,9 @@ mod flight;
 use flight::{Outcome, Without};
 
 /// Frames of a burst: enough for two in flight to pay, few enough for many rounds.
-const BURST: u64 = 6;
+const BURST: u64 = 4;
 /// Rounds, unless time runs out before.
-const ROUNDS: usize = 15;
+const ROUNDS: usize = 25;
 /// No round begins after this.
 const BUDGET: Duration = Duration::from_secs(90);
 
@@ -39,6 +40,8 @@ struct Variant<'a> {
     start: Duration,
     /// Milliseconds a frame, one entry a round.
     ms: Vec<f64>,
+    /// The same on processors, over all threads.
+    processor_ms: Vec<f64>,
 }
 
 fn main() -> Outcome<()> {
@@ -68,7 +71,7 @@ fn main() -> Outcome<()> {
         let mut session = engine.session::<Infallible>(without.of(demo)?, channels)?;
         // The first dispatch of a pipeline compiles it.
         render(&mut session, 0..2)?;
-        variants.push(Variant { name, session, still, start: begin.elapsed(), ms: Vec::new() });
+        variants.push(Variant { name, session, still, start: begin.elapsed(), ms: Vec::new(), processor_ms: Vec::new() });
     }
     let plan = variants[0].session.planner().plan(0)?;
     let [ideal_width, ideal_height] = plan.ideal.size_px;
@@ -88,9 +91,11 @@ fn main() -> Outcome<()> {
             if variant.still {
                 render(&mut variant.session, [first])?;
             }
+            let busy = processor_ms();
             let begin = Instant::now();
             render(&mut variant.session, (first..first + burst).map(|frame| if variant.still { first } else { frame }))?;
             variant.ms.push(ms(begin.elapsed()) / burst as f64);
+            variant.processor_ms.extend(busy.zip(processor_ms()).map(|(before, after)| (after - before) / burst as f64));
         }
     }
     print_table(&variants);
@@ -108,18 +113,36 @@ fn ms(duration: Duration) -> f64 {
     1e3 * duration.as_secs_f64()
 }
 
+/// Time that the threads of this program have had a processor (`/proc/self/task/*/schedstat`, first field: nanoseconds).
+fn processor_ms() -> Option<f64> {
+    let mut sum_ns = 0.0;
+    for task in std::fs::read_dir("/proc/self/task").ok()? {
+        // A thread may end while the folder is read.
+        let Ok(line) = std::fs::read_to_string(task.ok()?.path().join("schedstat")) else { continue };
+        sum_ns += line.split_whitespace().next()?.parse::<f64>().ok()?;
+    }
+    Some(1e-6 * sum_ns)
+}
+
 fn print_table(variants: &[Variant<'_>]) {
-    let full = &variants[0].ms;
-    println!("rounds    {} of {BURST} frames, variants in turn", full.len());
+    let full = &variants[0];
+    println!("rounds    {} of {BURST} frames, variants in turn; medians, quartiles in brackets", full.ms.len());
     println!();
-    println!("| variant | ms a frame: median | quartiles | frames/s | against the full camera, ms | start, s |");
-    println!("|---|---|---|---|---|---|");
+    println!("| variant | ms a frame | frames/s | to the full camera | processor ms a frame | to the full camera | start, s |");
+    println!("|---|---|---|---|---|---|---|");
     for variant in variants {
-        let [low, median, high] = quartiles(variant.ms.clone());
-        let [_, against, _] = quartiles(variant.ms.iter().zip(full).map(|(own, full)| own - full).collect());
-        let name = variant.name;
-        let start_s = variant.start.as_secs_f64();
-        println!("| {name} | {median:.1} | {low:.1} .. {high:.1} | {:.1} | {against:+.1} | {start_s:.2} |", 1e3 / median);
+        let rate = 1e3 / quartiles(variant.ms.clone())[1];
+        let own = [(&variant.ms, &full.ms), (&variant.processor_ms, &full.processor_ms)];
+        let [wall, processor] = own.map(|(own, full)| match own.is_empty() {
+            true => "not known | ".to_owned(),
+            false => {
+                let [low, median, high] = quartiles(own.clone());
+                let [_, difference, _] = quartiles(own.iter().zip(full).map(|(own, full)| own - full).collect());
+                format!("{median:.1} ({low:.1} .. {high:.1}) | {difference:+.1}")
+            }
+        });
+        let (time, difference) = wall.split_once('|').unwrap_or_default();
+        println!("| {} | {time}| {rate:.1} |{difference} | {processor} | {:.2} |", variant.name, variant.start.as_secs_f64());
     }
 }
 
