@@ -22,8 +22,8 @@ struct IdealCamera {
 struct Surface {
     @builtin(position) clip: vec4<f32>,
     // At a place that the triangle covers: beyond its border a steep triangle's texture would run far.
-    @location(0) @interpolate(perspective, centroid) uv: vec2<f32>,
-    @location(1) @interpolate(perspective, centroid) in_camera_m: vec3<f32>,
+    @location(0) uv: vec2<f32>,
+    @location(1) in_camera_m: vec3<f32>,
 }
 
 // `from_base_m`: NED metres relative to the whole-metre base near the camera.

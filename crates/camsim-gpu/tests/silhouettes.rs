@@ -108,7 +108,7 @@ fn check(name: &str, scenario: &Scenario, trajectory: &Trajectory, scene: &Scene
         let sequence = sequence(scenario, trajectory.clone(), scene.clone());
         (render(&engine, &sequence, &[Channel::Color], 0), sequence)
     };
-    let (done, sequence) = made(1.0);
+    let (done, sequence) = made(0.5);
     let expected = expected(&sequence, &done.plan);
     let psnr = |done: &Finished| {
         let error2 = |&(i, expected): &(usize, DVec3)| {
