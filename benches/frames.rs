@@ -65,6 +65,7 @@ fn main() -> Outcome<()> {
         ("- rolling shutter", Without::RollingShutter, plain, false),
         ("- blur and rolling shutter", Without::Time, plain, false),
         ("- lens", Without::Lens, plain, false),
+        ("- samples at silhouettes", Without::SilhouetteSamples, plain, false),
         ("- all of these: a perfect camera", Without::Anything, plain, false),
     ] {
         let begin = Instant::now();

@@ -42,6 +42,8 @@ pub enum Without {
     Time,
     /// Distortion: a pinhole, no lens map.
     Lens,
+    /// Samples at silhouettes: one a pixel, as by a tolerance that they cannot break.
+    SilhouetteSamples,
     /// All of it, and the shaking mount: a perfect camera.
     Anything,
 }
@@ -60,6 +62,7 @@ impl Without {
             Self::Blur => camera.shutter.exposure_ms = 0.0,
             Self::RollingShutter => camera.shutter.readout_ms = 0.0,
             Self::Time | Self::Anything => camera.shutter = ShutterSpec::default(),
+            Self::SilhouetteSamples => sequence.scenario.quality.max_error_dn = 16.0,
             Self::Nothing | Self::Photometric | Self::Lens => {}
         }
         if matches!(self, Self::Lens | Self::Anything) {
