@@ -13,7 +13,7 @@ use crate::{
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
-    scenario::{Channel, Solver},
+    scenario::Channel,
     scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
@@ -344,14 +344,6 @@ impl IdealGeometry {
         let low = (DVec2::splat(-0.5) - self.principal_px) / self.focal_px;
         let high = (size - 0.5 - self.principal_px) / self.focal_px;
         [low.x, high.x, low.y, high.y]
-    }
-}
-
-/// Whether the solver asked for may be chosen at all: only `reproject` is there, by name or by `auto`.
-#[must_use]
-pub fn solver_name(solver: crate::scenario::Auto<Solver>) -> &'static str {
-    match solver.value() {
-        None | Some(Solver::Reproject) => "reproject",
     }
 }
 

@@ -27,6 +27,10 @@ use crate::{
     upload::SceneBuffers,
 };
 
+mod readback;
+
+use readback::{Output, coords, read_texture};
+
 /// Frames that the device works on while the host reads an older one.
 const FRAMES_IN_FLIGHT: usize = 2;
 /// Ideal targets of different size that are kept.
@@ -185,13 +189,6 @@ struct Slot {
     truth: Option<Output>,
 }
 
-/// A buffer that the device writes, and its copy that the host reads.
-#[derive(Debug)]
-struct Output {
-    on_device: wgpu::Buffer,
-    on_host: wgpu::Buffer,
-}
-
 /// A submitted frame.
 struct InFlight {
     slot: usize,
@@ -212,29 +209,6 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
-}
-
-impl Output {
-    fn new(gpu: &GpuContext, label: &str, size: u64) -> Self {
-        let create =
-            |usage| gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
-        Self {
-            on_device: create(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
-            on_host: create(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
-        }
-    }
-
-    fn copy(&self, encoder: &mut wgpu::CommandEncoder) {
-        encoder.copy_buffer_to_buffer(&self.on_device, 0, &self.on_host, 0, self.on_host.size());
-    }
-
-    fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
-        let view = self.on_host.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
-        let values = bytemuck::pod_collect_to_vec(&view);
-        drop(view);
-        self.on_host.unmap();
-        Ok(values)
-    }
 }
 
 impl Slot {
@@ -472,47 +446,4 @@ impl<E: std::error::Error + 'static> RenderError<E> {
             RenderError::Sink(never) => match never {},
         }
     }
-}
-
-fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
-    let width = plan.camera.size_px[0];
-    let dt_s = |i: u32| plan.shutter.dt_pixel_s(i % width, i / width) as f32;
-    truth
-        .iter()
-        .zip(0..)
-        .map(|(t, i)| [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s(i), t.point_ned_m[0], t.point_ned_m[1], t.point_ned_m[2]])
-        .collect()
-}
-
-fn read_texture<T: bytemuck::Pod>(gpu: &GpuContext, texture: &wgpu::Texture, width: u32, height: u32) -> Result<Vec<T>, GpuError> {
-    let row = width * size_of::<T>() as u32;
-    let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-    // Depth can only be copied whole.
-    let (copy_width, copy_height) = (texture.width(), texture.height());
-    let copy_row = (copy_width * size_of::<T>() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT).max(padded);
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.read_texture"),
-        size: u64::from(copy_row) * u64::from(copy_height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
-    encoder.copy_texture_to_buffer(
-        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },
-        },
-        wgpu::Extent3d { width: copy_width, height: copy_height, depth_or_array_layers: 1 },
-    );
-    gpu.queue.submit([encoder.finish()]);
-    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
-    let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
-    let mut values = Vec::with_capacity((width * height) as usize);
-    for y in 0..height {
-        let start = (y * copy_row) as usize;
-        values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&view[start..start + row as usize]));
-    }
-    Ok(values)
 }

@@ -1,0 +1,88 @@
+//! From the device to the host: output buffers, and textures for a look at single stages.
+
+use camsim_core::plan::FramePlan;
+
+use crate::{
+    context::{GpuContext, GpuError},
+    layout::Truth,
+};
+
+/// A buffer that the device writes, and its copy that the host reads.
+#[derive(Debug)]
+pub(super) struct Output {
+    pub on_device: wgpu::Buffer,
+    pub on_host: wgpu::Buffer,
+}
+
+impl Output {
+    pub fn new(gpu: &GpuContext, label: &str, size: u64) -> Self {
+        let create =
+            |usage| gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        Self {
+            on_device: create(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC),
+            on_host: create(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST),
+        }
+    }
+
+    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_buffer_to_buffer(&self.on_device, 0, &self.on_host, 0, self.on_host.size());
+    }
+
+    pub fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
+        let view = self.on_host.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
+        let values = bytemuck::pod_collect_to_vec(&view);
+        drop(view);
+        self.on_host.unmap();
+        Ok(values)
+    }
+}
+
+/// What the shader wrote beside the picture, with each pixel's time shift.
+pub(super) fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
+    let width = plan.camera.size_px[0];
+    let dt_s = |i: u32| plan.shutter.dt_pixel_s(i % width, i / width) as f32;
+    truth
+        .iter()
+        .zip(0..)
+        .map(|(t, i)| [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s(i), t.point_ned_m[0], t.point_ned_m[1], t.point_ned_m[2]])
+        .collect()
+}
+
+/// The top-left `width` x `height` texels of a texture.
+pub(super) fn read_texture<T: bytemuck::Pod>(
+    gpu: &GpuContext,
+    texture: &wgpu::Texture,
+    width: u32,
+    height: u32,
+) -> Result<Vec<T>, GpuError> {
+    let row = width * size_of::<T>() as u32;
+    let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    // Depth can only be copied whole.
+    let (copy_width, copy_height) = (texture.width(), texture.height());
+    let copy_row = (copy_width * size_of::<T>() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT).max(padded);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.read_texture"),
+        size: u64::from(copy_row) * u64::from(copy_height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
+    encoder.copy_texture_to_buffer(
+        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },
+        },
+        wgpu::Extent3d { width: copy_width, height: copy_height, depth_or_array_layers: 1 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
+    let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
+    let mut values = Vec::with_capacity((width * height) as usize);
+    for y in 0..height {
+        let start = (y * copy_row) as usize;
+        values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&view[start..start + row as usize]));
+    }
+    Ok(values)
+}
