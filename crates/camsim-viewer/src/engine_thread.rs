@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn pictures_are_srgb_and_invalid_pixels_transparent() {
-        let frame = RenderedFrame { size_px: [2, 1], color_rgba: vec![0.214_041, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], ..Default::default() };
+        let frame = RenderedFrame { size_px: [2, 1], color_rgba: vec![0.215_861, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0], ..Default::default() };
         let image = picture(&frame);
         assert_eq!(image.pixels[0].to_array(), [128, 0, 255, 255]);
         assert_eq!(image.pixels[1].a(), 0);
