@@ -19,6 +19,9 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary, read_terrain},
 };
 
+/// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of it would not end.
+const MOST_FRAMES: f64 = 10e6;
+
 /// Why a scenario cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
@@ -48,6 +51,11 @@ pub enum LoadError {
     /// No frame falls into the window.
     #[error("flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher")]
     NoFrame(f64, f64, f64),
+    /// More frames than a sequence may have.
+    #[error(
+        "the window holds {0:.0} frames at {1} frames a second, more than {MOST_FRAMES:.0}: make flight.window_s shorter or camera.fps lower"
+    )]
+    TooManyFrames(f64, f64),
     /// The zoom track.
     #[error("{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` and rows of finite numbers by ascending time")]
     ZoomTrack {
@@ -168,7 +176,19 @@ fn frames_of_window(scenario: &Scenario, log: &FlightLog) -> Result<(f64, u64), 
     if count < 1.0 {
         return Err(LoadError::NoFrame(start_s * speed, end_s * speed, camera.fps));
     }
+    if count > MOST_FRAMES {
+        return Err(LoadError::TooManyFrames(count, camera.fps));
+    }
     Ok((start_s, count as u64))
+}
+
+/// How many frames have the instant of their image centre, `(i + phase)/fps - delay` after `start_s`, outside of the log.
+fn frames_outside(sequence: &Sequence) -> usize {
+    let (first_s, last_s) = sequence.path.span_s();
+    let camera = &sequence.scenario.camera;
+    let centre_s = |i: u64| sequence.start_s + (i as f64 + camera.phase) / camera.fps - camera.shutter.delay_ms * 1e-3;
+    // A nanosecond, the resolution of a stamp, is no excursion.
+    (0..sequence.frames).filter(|&i| centre_s(i) < first_s - 1e-9 || centre_s(i) > last_s + 1e-9).count()
 }
 
 /// `t_s,zoom` on the log's clock, brought to path time.
@@ -218,15 +238,13 @@ pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) 
 
 fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
-    let (first_s, last_s) = sequence.path.span_s();
     let fps = sequence.scenario.camera.fps;
-    let end_s = sequence.start_s + (sequence.frames - 1) as f64 / fps;
-    let outside = (0..sequence.frames).filter(|&i| {
-        let t = sequence.start_s + i as f64 / fps;
-        t < first_s || t > last_s
-    });
-    if sequence.start_s < first_s || end_s > last_s {
-        warnings.push(format!("{} frames lie outside of the log and fly on at constant velocity", outside.count()));
+    let outside = frames_outside(sequence);
+    if outside > 0 {
+        warnings.push(format!(
+            "{outside} of {} frames lie outside of the log and fly on at constant velocity: check flight.window_s and camera.shutter.delay_ms",
+            sequence.frames
+        ));
     }
     if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
         let step = (sequence.frames / 200).max(1);
