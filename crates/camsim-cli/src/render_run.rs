@@ -6,6 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use anyhow::anyhow;
 use camsim_core::{plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
 use camsim_gpu::{Engine, engine::Finished};
 use camsim_io::{
@@ -66,6 +67,10 @@ pub fn run(job: &Job<'_>, engine: &Engine, console: &mut Console<'_>, look: &mut
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     let mut session = engine.session::<WriteError>(job.sequence.clone(), &scenario.output.channels)?;
+    // What cannot be planned is refused before anything is written.
+    if let Some(&first) = todo.first() {
+        session.planner().plan(first).or_bad_input()?;
+    }
     let mut manifest = RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         adapter: engine.gpu().adapter.to_string(),
@@ -83,15 +88,23 @@ pub fn run(job: &Job<'_>, engine: &Engine, console: &mut Console<'_>, look: &mut
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
+    let mut blind = 0_u64;
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
     let rendered = session.render(todo.iter().copied(), &mut |finished| {
         look(&finished);
+        blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         bar.inc(1);
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
     });
     bar.finish_and_clear();
     rendered?;
+    if blind > 0 {
+        console.warn(format_args!(
+            "{blind} of {} frames see no surface, only sky: check camera.mount, flight.height and where the scene lies",
+            todo.len()
+        ));
+    }
     let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);
     let time = begin.elapsed();
 
@@ -113,11 +126,21 @@ fn check_folder(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failure>
     }
 }
 
+/// Rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
+const MOST_TRAJECTORY_ROWS: f64 = 10e6;
+
 /// `camera.toml`, `trajectory.csv` and `frames.csv`.
 fn write_tables(job: &Job<'_>, files: &FrameFiles, planner: &Planner) -> Result<(), Failure> {
     let sequence = job.sequence;
     let camera = camera_toml(&sequence.scenario.camera).or_failed()?;
     write_atomic(&job.folder.join("camera.toml"), camera.as_bytes()).or_failed()?;
+    let seen_s = planner.stamp_s(sequence.frames - 1) - planner.stamp_s(0);
+    let rows = seen_s * sequence.scenario.tracker.rate_hz;
+    if rows > MOST_TRAJECTORY_ROWS {
+        return Err(Failure::bad_input(anyhow!(
+            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make flight.window_s shorter or tracker.rate_hz lower"
+        )));
+    }
     let trajectory = trajectory_csv(trajectory_records(sequence, planner).or_bad_input()?);
     write_atomic(&job.folder.join("trajectory.csv"), trajectory.as_bytes()).or_failed()?;
     // A resumed folder may hold frames beyond those asked for now.

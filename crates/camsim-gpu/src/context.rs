@@ -22,7 +22,7 @@ pub enum GpuError {
     #[error("the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out")]
     Device(String),
     /// A picture or table does not fit the adapter.
-    #[error("{what} needs {needed}, but adapter limit {limit_name} is {limit}: {fix}")]
+    #[error("{what} needs {needed}, but the adapter's {limit_name} is {limit}: {fix}")]
     TooLarge {
         /// What does not fit.
         what: String,
@@ -166,6 +166,6 @@ impl GpuContext {
         if bytes <= limit {
             return Ok(());
         }
-        Err(GpuError::TooLarge { what: what.into(), needed: bytes, limit_name: "max_storage_buffer_binding_size", limit, fix })
+        Err(GpuError::TooLarge { what: what.into(), needed: bytes, limit_name: "max_storage_buffer_binding_size (bytes)", limit, fix })
     }
 }

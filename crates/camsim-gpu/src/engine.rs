@@ -104,7 +104,11 @@ impl Engine {
         let gpu = &self.gpu;
         let planner = Planner::new(sequence.clone(), channels, gpu.max_side_px())?;
         let pixels = u64::from(sequence.scenario.camera.size_px[0]) * u64::from(sequence.scenario.camera.size_px[1]);
-        gpu.check_storage("the output frame", 32 * pixels, "reduce camera.size_px")?;
+        gpu.check_storage("the output frame's colour", 16 * pixels, "reduce camera.size_px")?;
+        if planner.wants_truth() {
+            let bytes = size_of::<Truth>() as u64 * pixels;
+            gpu.check_storage("the output frame's depth and coords", bytes, "reduce camera.size_px or leave them out of output.channels")?;
+        }
         let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let ideal_pass = IdealPass::new(gpu)?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();

@@ -3,6 +3,7 @@
 use std::{cell::RefCell, path::PathBuf, sync::Arc};
 
 use camsim_core::{
+    camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
     mount::{CameraPath, MountError},
@@ -11,7 +12,7 @@ use camsim_core::{
     sequence::Sequence,
     tracker::{Tracked, TrackerError, track},
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use crate::{
     flight_log::{FlightLogError, read_flight_log},
@@ -236,8 +237,38 @@ pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) 
     warnings
 }
 
+/// A flight this far from its origin is likelier a slip than a flight.
+const FAR_FROM_ORIGIN_M: f64 = 500e3;
+
+/// Says how much of the picture no ray reaches, by every 16th pixel of a fixed lens.
+fn blind_share_warning(sequence: &Sequence) -> Option<String> {
+    let camera = CameraModel::from_spec(&sequence.scenario.camera).ok()?;
+    let [width, height] = camera.size_px;
+    let (mut all, mut blind) = (0_u32, 0_u32);
+    for y in (8..height).step_by(16) {
+        for x in (8..width).step_by(16) {
+            all += 1;
+            blind += u32::from(camera.unproject(DVec2::new(f64::from(x), f64::from(y))).is_none());
+        }
+    }
+    let share = 100.0 * f64::from(blind) / f64::from(all.max(1));
+    (share >= 0.5).then(|| {
+        format!(
+            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see `camsim lens CAMERA.toml check`"
+        )
+    })
+}
+
 fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
+    warnings.extend(blind_share_warning(sequence));
+    let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();
+    if far_m > FAR_FROM_ORIGIN_M {
+        warnings.push(format!(
+            "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the log's positions",
+            far_m / 1e3
+        ));
+    }
     let fps = sequence.scenario.camera.fps;
     let outside = frames_outside(sequence);
     if outside > 0 {

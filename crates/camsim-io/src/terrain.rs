@@ -72,6 +72,14 @@ pub enum TerrainFileError {
     /// A file that cannot be read or decoded.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// A picture where heights are wanted.
+    #[error("{path}: has {bands} bands, so it is a picture and no DEM: heights are one band (scene.terrain.ortho takes the picture)")]
+    NotHeights {
+        /// The file.
+        path: PathBuf,
+        /// Its bands.
+        bands: usize,
+    },
     /// The DEM says nothing about where it is.
     #[error(
         "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it. \
@@ -231,6 +239,9 @@ impl Dem {
         };
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
         let mark = geo.nodata.unwrap_or(COMMON_NODATA);
+        if raster.bands() > 2 {
+            return Err(TerrainFileError::NotHeights { path: path.into(), bands: raster.bands() });
+        }
         let mut heights_m = raster.first_band();
         heights_m.par_iter_mut().for_each(|height| {
             // A float32 file may declare its mark with more digits than it holds.

@@ -201,7 +201,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
     check.at_least_one("quality.blur_samples", quality.blur_samples);
     check.at_least_one("quality.footprint_taps", quality.footprint_taps);
-    check.at_least_one("quality.key_frames", quality.key_frames);
+    check.require(quality.key_frames.value().is_none_or(|frames| frames == 1), "quality.key_frames", || {
+        "only 1 ideal frame for each output frame is supported by this version; write 1 or \"auto\"".into()
+    });
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
     });

@@ -101,6 +101,11 @@ impl Raster {
         Ok(Self { size: [width, height], geo, color, bands: length / pixels, is_planar, data, palette })
     }
 
+    /// Samples a pixel.
+    pub fn bands(&self) -> usize {
+        self.bands
+    }
+
     /// The first band.
     pub fn first_band(&self) -> Vec<f64> {
         fn pick<T: Copy>(values: &[T], every: usize, count: usize, to_f64: impl Fn(T) -> f64) -> Vec<f64> {
