@@ -231,6 +231,9 @@ fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64
 #[must_use]
 pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
     let mut warnings = tracked.warnings();
+    if log.rows.len() == 1 {
+        warnings.push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
+    }
     if !log.report.is_clean() {
         warnings.push(format!("{}: {}", scenario.flight.log.display(), log.report));
     }
