@@ -33,5 +33,7 @@ else
 fi
 
 say "tests"
-cargo test --workspace
+# Examples in the documentation first, so that the run closes on the suite itself.
+cargo test --workspace --doc
+cargo test --workspace --lib --bins --tests
 say "all passed"
