@@ -11,7 +11,7 @@ use super::{BlurStage, Skip};
 use crate::{
     pose::CameraPose,
     scenario::QualitySpec,
-    scene::{Aabb, Mesh, Scene, Terrain},
+    scene::{Aabb, Mesh, Scene, Terrain, terrain::Frustum},
 };
 
 /// Cells along the side of a block that shares one slope bound.
@@ -79,14 +79,15 @@ impl SceneOutline {
 
     /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents` (u_min, u_max, v_min, v_max).
     fn reason_for_none(&self, scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> Option<String> {
-        let view = View::new(pose, tangents);
-        let terrain = self.chunks.iter().any(|patch| view.may_see(&patch.bounds));
-        let mut meshes = self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| view.may_see(&outline.bounds));
+        let frustum = Frustum::new(pose, tangents);
+        let terrain = self.chunks.iter().any(|patch| frustum.may_see(&patch.bounds));
+        let mut meshes = self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| frustum.may_see(&outline.bounds));
         match (terrain, meshes.next(), meshes.next()) {
             (false, None, _) => Some("nothing but sky is in view".into()),
             (true, None, _) => {
                 let edge = self.chunks.iter().zip(&self.blocks).any(|(chunk, blocks)| {
-                    view.may_end_or_turn(chunk, pose, travel_m) && blocks.iter().any(|block| view.may_end_or_turn(block, pose, travel_m))
+                    may_end_or_turn(&frustum, chunk, pose, travel_m)
+                        && blocks.iter().any(|block| may_end_or_turn(&frustum, block, pose, travel_m))
                 });
                 (!edge).then(|| "the terrain fills the view and no slope in it can be seen edge-on".into())
             }
@@ -220,47 +221,19 @@ fn covers(mesh: &Mesh, pose: &CameraPose, [u_min, u_max, v_min, v_max]: [f64; 4]
         .all(|uv| mesh.intersect(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0), f64::INFINITY).is_some())
 }
 
-/// Half-spaces that a camera sees.
-struct View {
-    position_ned_m: DVec3,
-    inward_ned: [DVec3; 5],
-}
-
-impl View {
-    fn new(pose: &CameraPose, [u_min, u_max, v_min, v_max]: [f64; 4]) -> Self {
-        let in_camera = [
-            DVec3::new(1.0, 0.0, -u_min),
-            DVec3::new(-1.0, 0.0, u_max),
-            DVec3::new(0.0, 1.0, -v_min),
-            DVec3::new(0.0, -1.0, v_max),
-            DVec3::Z,
-        ];
-        Self { position_ned_m: pose.position_ned_m, inward_ned: in_camera.map(|n| pose.ned_from_camera * n) }
+/// False only if the patch is out of sight, or continues beyond its borders and faces the camera everywhere: a surface of slope s
+/// faces a ray that goes down by more than s for each metre ahead.
+fn may_end_or_turn(frustum: &Frustum, patch: &Patch, pose: &CameraPose, travel_m: f64) -> bool {
+    if !frustum.may_see(&patch.bounds) {
+        return false;
     }
-
-    /// False only if the whole box is out of sight.
-    fn may_see(&self, bounds: &Aabb) -> bool {
-        !bounds.is_empty()
-            && self.inward_ned.iter().all(|&n| {
-                let farthest_in = DVec3::select(n.cmpgt(DVec3::ZERO), bounds.max, bounds.min);
-                n.dot(farthest_in - self.position_ned_m) >= 0.0
-            })
-    }
-
-    /// False only if the patch is out of sight, or continues beyond its borders and faces the camera everywhere: a surface of slope s
-    /// faces a ray that goes down by more than s for each metre ahead.
-    fn may_end_or_turn(&self, patch: &Patch, pose: &CameraPose, travel_m: f64) -> bool {
-        if !self.may_see(&patch.bounds) {
-            return false;
-        }
-        let camera = pose.position_ned_m;
-        let down_m = patch.bounds.min.z - camera.z - travel_m;
-        let ahead = (patch.bounds.max - camera).abs().max((patch.bounds.min - camera).abs());
-        let ahead_m = ahead.truncate().length() + travel_m;
-        // False for a NaN, which so counts as a silhouette.
-        let faces_camera = patch.slope * ahead_m < FACING_MARGIN * down_m;
-        patch.rim || !faces_camera
-    }
+    let camera = pose.position_ned_m;
+    let down_m = patch.bounds.min.z - camera.z - travel_m;
+    let ahead = (patch.bounds.max - camera).abs().max((patch.bounds.min - camera).abs());
+    let ahead_m = ahead.truncate().length() + travel_m;
+    // False for a NaN, which so counts as a silhouette.
+    let faces_camera = patch.slope * ahead_m < FACING_MARGIN * down_m;
+    patch.rim || !faces_camera
 }
 
 #[cfg(test)]

@@ -25,6 +25,7 @@ use glam::{DVec3, Vec3};
 
 pub use bounds::Aabb;
 use bounds::BlockTree;
+pub(crate) use query::Frustum;
 pub use query::TerrainHit;
 pub(super) use query::intersect_triangle;
 pub use select::{ChunkDraw, LodSelection, select_lod};

@@ -143,7 +143,7 @@ pub(in crate::scene) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, di
 }
 
 /// Half-spaces that a camera sees.
-pub(super) struct Frustum {
+pub(crate) struct Frustum {
     position_ned_m: DVec3,
     /// Inward normals, NED.
     normals: [DVec3; 5],
