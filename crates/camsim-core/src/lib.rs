@@ -56,3 +56,5 @@ pub mod noise;
 pub mod frame;
 
 pub mod metrics;
+
+pub mod reference;

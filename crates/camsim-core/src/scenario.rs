@@ -227,8 +227,14 @@ pub enum Preset {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
+    /// One straight step at constant velocity and depth (paper eq. 16).
+    Linear,
+    /// Heun's steps of at most 2.5 deg at constant velocity and depth (paper eq. 18).
+    Rk2,
     /// Exact relative pose per row and sample, depth by fixed-point iteration.
     Reproject,
+    /// Every sample of every pixel by a ray of its own, in f64 on the CPU: the reference, slow.
+    Oracle,
 }
 
 /// `[output]`: channels and file formats.

@@ -4,6 +4,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+pub mod displacement;
 pub mod edges;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
