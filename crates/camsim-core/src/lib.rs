@@ -53,6 +53,8 @@ pub mod photometric;
 
 pub mod noise;
 
+pub mod apply;
+
 pub mod frame;
 
 pub mod metrics;

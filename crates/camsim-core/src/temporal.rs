@@ -69,6 +69,22 @@ impl InverseDepthImage<'_> {
             }
         }
     }
+
+    /// The nearest texel, edges held.
+    #[must_use]
+    pub fn nearest(&self, at_px: DVec2) -> f64 {
+        let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
+        let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
+        f64::from(self.values[at.y as usize * self.size_px[0] as usize + at.x as usize])
+    }
+
+    /// Largest less smallest of the four texels around a position.
+    #[must_use]
+    pub fn spread(&self, at_px: DVec2) -> f64 {
+        let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].map(|half| self.nearest(at_px + DVec2::from_array(half)));
+        let [a, b, c, d] = corners;
+        a.max(b).max(c).max(d) - a.min(b).min(c).min(d)
+    }
 }
 
 /// Where an output ray looks in the ideal frame.
