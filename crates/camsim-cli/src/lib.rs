@@ -30,6 +30,7 @@ Examples:
   camsim render flight.toml --frames 0..10 --set camera.shutter.readout_ms=0
   camsim explain flight.toml --frame 7            what a frame takes, and what it doesn't
   camsim camera import calib.yaml -o CAMERA.toml  calibrations of other programs
+  camsim apply CAMERA.toml FRAME.toml -o out.png  an ideal RGB-D picture of any origin, through the camera
 
 Exit codes:
   0  done
@@ -61,6 +62,7 @@ enum Command {
     Track(commands::track::Args),
     Lens(commands::lens::Args),
     Camera(commands::camera::Args),
+    Apply(commands::apply::Args),
     Compare(commands::compare::Args),
     Info(commands::info::Args),
     Viewer(commands::viewer::Args),
@@ -97,6 +99,7 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Track(args) => commands::track::run(&args, console),
         Command::Lens(args) => commands::lens::run(&args, console),
         Command::Camera(args) => commands::camera::run(&args, console),
+        Command::Apply(args) => commands::apply::run(&args, console),
         Command::Compare(args) => commands::compare::run(&args, console),
         Command::Info(args) => commands::info::run(&args, console),
         Command::Viewer(args) => commands::viewer::run(&args),

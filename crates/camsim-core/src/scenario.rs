@@ -18,7 +18,7 @@ pub use camera::{
     ZoomSpec,
 };
 pub use scene::{HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
-pub use validate::{Problem, validate};
+pub use validate::{Problem, validate, validate_camera};
 
 /// Everything that one run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -8,6 +8,8 @@ pub mod scenario_file;
 
 pub mod camera_file;
 
+pub mod frame_file;
+
 pub mod flight_log;
 
 pub mod terrain;

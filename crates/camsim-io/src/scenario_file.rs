@@ -5,12 +5,12 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::scenario::{CameraSpec, Preset, Scenario, validate};
+use camsim_core::scenario::{CameraSpec, Preset, Problem, Scenario, validate, validate_camera};
 use thiserror::Error;
 
-mod check;
-mod schema;
-mod tree;
+pub(crate) mod check;
+pub(crate) mod schema;
+pub(crate) mod tree;
 
 use tree::Tree;
 
@@ -70,11 +70,26 @@ pub fn parse_scenario(text: &str, path: &Path, sets: &[(String, String)]) -> Res
 /// As [`read_scenario`].
 pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
     let mut tree = Tree::read(path, "camera")?;
-    let problems = check::check(&mut tree, "camera");
+    let problems = check::check(&mut tree, &schema::SCENARIO, "camera");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
     }
     deserialize(&tree)
+}
+
+/// As [`read_camera`], with the ranges of all values checked.
+///
+/// # Errors
+/// As there, and values out of range.
+pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
+    let camera = read_camera(path)?;
+    let problems = validate_camera(&camera);
+    if problems.is_empty() {
+        return Ok(camera);
+    }
+    // In a camera file the keys stand at the root.
+    let line = |problem: &Problem| format!("{}: {}", path.display(), problem.to_string().trim_start_matches("camera."));
+    Err(ScenarioError::Problems(problems.iter().map(line).collect()))
 }
 
 /// The commented default scenario: what `camsim render --print-default` prints.
@@ -87,7 +102,7 @@ fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> 
     for (key, text) in sets {
         tree.set(key, text)?;
     }
-    let problems = check::check(&mut tree, "");
+    let problems = check::check(&mut tree, &schema::SCENARIO, "");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
     }
@@ -103,7 +118,7 @@ fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> 
 }
 
 /// What the schema lets through and the struct does not (a number beyond its integer type) is named without a line.
-fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
+pub(crate) fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
     let described = |error: toml::de::Error| ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())]);
     toml::Value::Table(tree.root.clone()).try_into().map_err(described)
 }

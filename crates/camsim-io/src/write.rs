@@ -22,12 +22,14 @@ mod atomic;
 mod encode;
 mod exr_file;
 mod frames;
+mod picture;
 mod png_file;
 mod tables;
 
 pub use atomic::write_atomic;
 pub use encode::{luminance, srgb_from_linear};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary};
+pub use picture::write_picture;
 pub use png_file::contact_sheet;
 pub use tables::{
     FRAMES_COLUMNS, FrameRecord, ROWS_COLUMNS, TRAJECTORY_COLUMNS, TrajectoryRecord, camera_toml, frames_csv, rows_csv, trajectory_csv,

@@ -30,6 +30,13 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check.problems
 }
 
+/// The same for a camera alone; keys begin with `camera.`.
+pub fn validate_camera(camera: &CameraSpec) -> Vec<Problem> {
+    let mut check = Check::default();
+    check_camera(&mut check, camera);
+    check.problems
+}
+
 #[derive(Default)]
 struct Check {
     problems: Vec<Problem>,

@@ -3,28 +3,28 @@
 use toml::{Table, Value};
 
 use super::{
-    schema::{self, Kind},
+    schema::{self, Kind, Schema},
     tree::{Tree, join},
 };
 
 /// Checks `tree` below `prefix` (`""` for a scenario, `"camera"` for a camera file) and resolves its paths; gives one line a problem.
-pub(super) fn check(tree: &mut Tree, prefix: &str) -> Vec<String> {
+pub(crate) fn check(tree: &mut Tree, schema: &Schema, prefix: &str) -> Vec<String> {
     let mut problems = Vec::new();
     let mut root = std::mem::take(&mut tree.root);
-    check_table(tree, &mut root, prefix, prefix, &mut problems);
+    check_table(tree, schema, &mut root, prefix, prefix, &mut problems);
     tree.root = root;
     problems
 }
 
 /// `at` is the key with indices (its place), `key` the one without (the schema's).
-fn check_table(tree: &Tree, table: &mut Table, at: &str, key: &str, problems: &mut Vec<String>) {
+fn check_table(tree: &Tree, schema: &Schema, table: &mut Table, at: &str, key: &str, problems: &mut Vec<String>) {
     for (name, value) in table.iter_mut() {
         let (at, key) = (join(at, name), join(key, name));
-        let wrong = match (schema::kind_of(&key), value) {
+        let wrong = match (schema.kind_of(&key), value) {
             (Some(Kind::Tables), Value::Array(array)) if array.iter().all(Value::is_table) => {
                 for (index, element) in array.iter_mut().enumerate() {
                     if let Value::Table(table) = element {
-                        check_table(tree, table, &join(&at, &index.to_string()), &key, problems);
+                        check_table(tree, schema, table, &join(&at, &index.to_string()), &key, problems);
                     }
                 }
                 None
@@ -33,20 +33,20 @@ fn check_table(tree: &Tree, table: &mut Table, at: &str, key: &str, problems: &m
                 *path = tree.resolve(&at, path).to_string_lossy().into_owned();
                 None
             }
-            (Some(kind), value) => expected(&key, kind, value),
-            (None, Value::Table(table)) if schema::is_table(&key) => {
-                check_table(tree, table, &at, &key, problems);
+            (Some(kind), value) => expected(schema, &key, kind, value),
+            (None, Value::Table(table)) if schema.is_table(&key) => {
+                check_table(tree, schema, table, &at, &key, problems);
                 None
             }
-            (None, value) if schema::is_table(&key) => Some(format!("expected a table, found {}", show(value))),
-            (None, _) => Some(match schema::nearest(&key) {
+            (None, value) if schema.is_table(&key) => Some(format!("expected a table, found {}", show(value))),
+            (None, _) => Some(match schema.nearest(&key) {
                 Some(near) => format!("unknown key; did you mean `{near}`?"),
-                None => "unknown key; `camsim render --print-default` lists all keys".into(),
+                None => format!("unknown key; {}", schema.listing),
             }),
         };
         problems.extend(wrong.map(|message| format!("{}: {at}: {message}", tree.place(&at))));
     }
-    for (required, within) in schema::REQUIRED {
+    for (required, within) in schema.required {
         let missing = *within == key;
         let path = required.strip_prefix(within).unwrap_or(required).trim_start_matches('.');
         if missing && !has(table, path) {
@@ -62,7 +62,7 @@ fn has(table: &Table, path: &str) -> bool {
     }
 }
 
-fn expected(key: &str, kind: Kind, value: &Value) -> Option<String> {
+fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<String> {
     let number = |value: &Value| value.is_float() || value.is_integer();
     let whole = |value: &Value| value.as_integer().is_some_and(|value| value >= 0);
     let all = |value: &Value, count: Option<usize>, test: &dyn Fn(&Value) -> bool| {
@@ -88,7 +88,7 @@ fn expected(key: &str, kind: Kind, value: &Value) -> Option<String> {
         return None;
     }
     let written: Vec<&str> = value.as_str().into_iter().chain(value.as_array().into_iter().flatten().filter_map(Value::as_str)).collect();
-    if let Some((_, word)) = schema::LATER_WORDS.iter().find(|(its_key, word)| *its_key == key && written.contains(word)) {
+    if let Some((_, word)) = schema.later_words.iter().find(|(its_key, word)| *its_key == key && written.contains(word)) {
         return Some(format!("\"{word}\" is not supported by this version; expected {text}"));
     }
     let hint = match kind {

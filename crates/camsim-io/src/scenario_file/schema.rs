@@ -1,8 +1,25 @@
-//! Every key of a scenario file, with what it takes. A test holds this table against the structs.
+//! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml has a table of its own.
+
+/// A table of keys with what belongs to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Schema {
+    /// Dotted keys; elements of an array of tables stand without their index.
+    pub(crate) keys: &'static [(&'static str, Kind)],
+    /// Words that the format knows and this version does not.
+    pub(crate) later_words: &'static [(&'static str, &'static str)],
+    /// Keys without which there is nothing to run, under the table that makes them necessary.
+    pub(crate) required: &'static [(&'static str, &'static str)],
+    /// Where a user finds all keys.
+    pub(crate) listing: &'static str,
+}
+
+/// Scenarios, and camera files below `camera`.
+pub(crate) const SCENARIO: Schema =
+    Schema { keys: KEYS, later_words: LATER_WORDS, required: REQUIRED, listing: "`camsim render --print-default` lists all keys" };
 
 /// What a key takes.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// A number.
     Number,
     /// A number, or one of these words.
@@ -36,7 +53,7 @@ use Kind::*;
 const AUTO: &[&str] = &["auto"];
 const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 
-/// Dotted keys; elements of an array of tables stand without their index.
+/// Of a scenario.
 pub(super) const KEYS: &[(&str, Kind)] = &[
     ("seed", Whole),
     ("flight.log", Path),
@@ -133,30 +150,32 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("camera.zoom.focal_px", "camera.zoom"),
 ];
 
-pub(super) fn kind_of(key: &str) -> Option<Kind> {
-    KEYS.iter().find(|(name, _)| *name == key).map(|(_, kind)| *kind)
-}
-
-/// Whether `key` is a table of the schema (`camera.lens`).
-pub(super) fn is_table(key: &str) -> bool {
-    key.is_empty() || KEYS.iter().any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
-}
-
-/// The known key that is most like `key`: a sibling first, else anywhere (a key in the wrong table).
-pub(super) fn nearest(key: &str) -> Option<String> {
-    let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
-    let mut names: Vec<&str> = Vec::new();
-    for (name, _) in KEYS {
-        names.extend(name.match_indices('.').map(|(at, _)| &name[..at]));
-        names.push(name);
+impl Schema {
+    pub(crate) fn kind_of(&self, key: &str) -> Option<Kind> {
+        self.keys.iter().find(|(name, _)| *name == key).map(|(_, kind)| *kind)
     }
-    let score = |name: &&str| {
-        let (its_parent, its_leaf) = name.rsplit_once('.').unwrap_or(("", name));
-        let alike = alikeness(leaf, its_leaf);
-        if its_parent == parent { alike + 0.15 } else { alike }
-    };
-    let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-    (score(&best) > 0.72).then(|| best.to_owned())
+
+    /// Whether `key` is a table of the schema (`camera.lens`).
+    pub(crate) fn is_table(&self, key: &str) -> bool {
+        key.is_empty() || self.keys.iter().any(|(name, _)| name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.')))
+    }
+
+    /// The known key that is most like `key`: a sibling first, else anywhere (a key in the wrong table).
+    pub(crate) fn nearest(&self, key: &str) -> Option<String> {
+        let (parent, leaf) = key.rsplit_once('.').unwrap_or(("", key));
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in self.keys {
+            names.extend(name.match_indices('.').map(|(at, _)| &name[..at]));
+            names.push(name);
+        }
+        let score = |name: &&str| {
+            let (its_parent, its_leaf) = name.rsplit_once('.').unwrap_or(("", name));
+            let alike = alikeness(leaf, its_leaf);
+            if its_parent == parent { alike + 0.15 } else { alike }
+        };
+        let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+        (score(&best) > 0.72).then(|| best.to_owned())
+    }
 }
 
 /// The word of `words` that is most like `word`.

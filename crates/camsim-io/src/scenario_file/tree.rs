@@ -15,7 +15,7 @@ use super::ScenarioError;
 
 /// Where a key was written.
 #[derive(Clone, Debug)]
-pub(super) enum Place {
+pub(crate) enum Place {
     /// File and line from 1.
     File(PathBuf, usize),
     /// `--set key=value`.
@@ -32,20 +32,20 @@ impl fmt::Display for Place {
 }
 
 /// Values by nesting, places by dotted key with indices.
-pub(super) struct Tree {
-    pub(super) file: PathBuf,
-    pub(super) root: Table,
-    pub(super) places: HashMap<String, Place>,
+pub(crate) struct Tree {
+    pub(crate) file: PathBuf,
+    pub(crate) root: Table,
+    pub(crate) places: HashMap<String, Place>,
 }
 
 impl Tree {
     /// Reads `path`; keys are placed under `prefix`.
-    pub(super) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
+    pub(crate) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
         let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
         Self::parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path, prefix)
     }
 
-    pub(super) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
+    pub(crate) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
         let line_of = |at: usize| text.as_bytes()[..at.min(text.len())].iter().filter(|&&b| b == b'\n').count() + 1;
         let syntax = |error: toml::de::Error| ScenarioError::Syntax {
             path: path.into(),
@@ -63,7 +63,7 @@ impl Tree {
     }
 
     /// The place of `key`, or of the nearest table around it.
-    pub(super) fn place(&self, key: &str) -> Place {
+    pub(crate) fn place(&self, key: &str) -> Place {
         let mut key = key;
         loop {
             if let Some(place) = self.places.get(key) {

@@ -1,0 +1,247 @@
+//! FRAME.toml: somebody else's ideal RGB-D frame and how its camera moved, for `camsim apply`.
+//!
+//! ```toml
+//! color = "ideal.png"                # EXR (linear), PNG, JPEG, BMP; alpha is not read
+//! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR
+//! depth = "depth.exr"                # EXR Z in metres, 16-bit PNG or PGM with depth_per_metre, or packed24
+//! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
+//! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers
+//! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
+//! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
+//! principal_point_px = [543.5, 407.5]  # default: its centre
+//! instant_ms = 0.0                   # when it was taken, from the stamp t_i
+//! [motion]                           # a twist about the frame's instant, in camera axes ...
+//! velocity_m_s = [0.0, 0.0, 0.0]
+//! angular_rate_rad_s = [0.0, 0.0, 0.628]
+//! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera),
+//! # stamp_s = 12.5                   #     and the stamp on their clock
+//! # [fog]                            # preset "paper" only: linear fog, added after the blur
+//! # end_m = 12000.0
+//! # color = [0.5, 0.6, 0.7]          # stored values
+//! ```
+//!
+//! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone.
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    apply::{IdealFrame, Motion, PoseTrack, PoseTrackError, paper::LinearFog},
+    temporal::{IdealGeometry, displacement::Twist},
+};
+use glam::{DVec2, DVec3};
+use serde::Deserialize;
+use thiserror::Error;
+
+use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
+
+mod depth;
+mod images;
+mod poses;
+mod schema;
+
+/// Why a frame file cannot be used.
+#[derive(Debug, Error)]
+pub enum FrameFileError {
+    /// The file itself: not readable, not TOML, keys or types.
+    #[error(transparent)]
+    File(#[from] ScenarioError),
+    /// A value that does not go with the others.
+    #[error("{}: {key}: {message}", path.display())]
+    Key {
+        /// FRAME.toml.
+        path: PathBuf,
+        /// The key.
+        key: &'static str,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// A picture.
+    #[error("{}: {message}", path.display())]
+    Picture {
+        /// The picture.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// The table of poses.
+    #[error("{}{}: {message}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+    Poses {
+        /// The table.
+        path: PathBuf,
+        /// Line from 1, where known.
+        line: Option<u64>,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// What the table says.
+    #[error("{}: {source}", path.display())]
+    Track {
+        /// The table.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        source: PoseTrackError,
+    },
+}
+
+/// The keys as written, paths resolved.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FrameSpec {
+    color: PathBuf,
+    color_space: Option<ColorSpace>,
+    depth: Option<PathBuf>,
+    #[serde(default)]
+    depth_encoding: DepthEncoding,
+    depth_per_metre: Option<f64>,
+    #[serde(default)]
+    depth_kind: DepthKind,
+    focal_px: [f64; 2],
+    principal_point_px: Option<[f64; 2]>,
+    #[serde(default)]
+    instant_ms: f64,
+    #[serde(default)]
+    motion: MotionSpec,
+    fog: Option<FogSpec>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct MotionSpec {
+    velocity_m_s: Option<[f64; 3]>,
+    angular_rate_rad_s: Option<[f64; 3]>,
+    trajectory: Option<PathBuf>,
+    stamp_s: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FogSpec {
+    end_m: f64,
+    color: [f64; 3],
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ColorSpace {
+    Srgb,
+    Linear,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum DepthEncoding {
+    #[default]
+    Plain,
+    Packed24,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum DepthKind {
+    #[default]
+    Planar,
+    Range,
+}
+
+/// A frame file, read with everything that it names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameFile {
+    /// The ideal frame.
+    pub frame: IdealFrame,
+    /// How its camera moved.
+    pub motion: Motion,
+    /// Fog of the paper's preset.
+    pub fog: Option<LinearFog>,
+    /// Share of the pixels whose depth is unknown or sky.
+    pub without_depth: f64,
+}
+
+/// Reads a frame file, its pictures and its poses.
+///
+/// # Errors
+/// [`FrameFileError`] names the file, the key where there is one, and what to do.
+pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
+    let mut tree = Tree::read(path, "")?;
+    let problems = check::check(&mut tree, &schema::FRAME, "");
+    if !problems.is_empty() {
+        return Err(ScenarioError::Problems(problems).into());
+    }
+    let spec: FrameSpec = deserialize(&tree)?;
+    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
+    if !spec.focal_px.iter().all(|f| f.is_finite() && *f > 0.0) {
+        return Err(fail("focal_px", "must be [fx, fy], both finite and above 0; for a mirrored axis flip the pictures instead"));
+    }
+    if !spec.instant_ms.is_finite() {
+        return Err(fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp"));
+    }
+    let color = images::read_color(&spec.color, spec.color_space)?;
+    let size_px @ [width, height] = color.size_px;
+    let focal_px = DVec2::from_array(spec.focal_px);
+    let centre = [0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0)];
+    let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(centre));
+    if !principal_px.is_finite() {
+        return Err(fail("principal_point_px", "must be two finite numbers; leave the key out for the picture's centre"));
+    }
+    let geometry = IdealGeometry { size_px, focal_px, principal_px };
+    let motion = read_motion(&spec.motion, path)?;
+    let inverse_depth = match &spec.depth {
+        Some(depth) => depth::read_inverse_depth(depth, &spec, &geometry, path)?,
+        None if translates(&motion) => {
+            return Err(fail(
+                "depth",
+                "is missing, and the camera moves: without depth nothing says by how much surfaces shift; add it, or leave only the rotation",
+            ));
+        }
+        None => vec![0.0; (width * height) as usize],
+    };
+    let fog = match spec.fog {
+        Some(FogSpec { end_m, color }) if end_m.is_finite() && end_m > 0.0 && color.iter().all(|v| (0.0..=1.0).contains(v)) => {
+            Some(LinearFog { end_m, color: DVec3::from_array(color) })
+        }
+        Some(_) => return Err(fail("fog", "needs end_m above 0 in metres and color = [r, g, b] in 0..1 (stored values)")),
+        None => None,
+    };
+    let without_depth = inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
+    let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, instant_s: 1e-3 * spec.instant_ms };
+    Ok(FrameFile { frame, motion, fog, without_depth })
+}
+
+fn translates(motion: &Motion) -> bool {
+    match motion {
+        Motion::Twist(twist) => twist.velocity_m_s != DVec3::ZERO,
+        Motion::Poses(_) => true,
+    }
+}
+
+/// A twist (nothing given is no motion) or a table of poses, not both.
+fn read_motion(spec: &MotionSpec, path: &Path) -> Result<Motion, FrameFileError> {
+    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
+    let Some(trajectory) = &spec.trajectory else {
+        if spec.stamp_s.is_some() {
+            return Err(fail(
+                "motion.stamp_s",
+                "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out",
+            ));
+        }
+        let [velocity, rate] = [spec.velocity_m_s, spec.angular_rate_rad_s].map(|v| DVec3::from_array(v.unwrap_or_default()));
+        for (key, value) in [("motion.velocity_m_s", velocity), ("motion.angular_rate_rad_s", rate)] {
+            if !value.is_finite() {
+                return Err(fail(key, "must be three finite numbers, in camera axes: x right, y down, z forward"));
+            }
+        }
+        return Ok(Motion::Twist(Twist { velocity_m_s: velocity, rate_rad_s: rate }));
+    };
+    if spec.velocity_m_s.is_some() || spec.angular_rate_rad_s.is_some() {
+        return Err(fail("motion", "has both a twist and a trajectory; give one of them"));
+    }
+    let Some(stamp_s) = spec.stamp_s else {
+        return Err(fail("motion.stamp_s", "is missing: give the stamp of the frame on the clock of motion.trajectory"));
+    };
+    let rows = poses::read_poses(trajectory, stamp_s)?;
+    // Rows come counted from the stamp.
+    let track = PoseTrack::new(rows, 0.0).map_err(|source| FrameFileError::Track { path: trajectory.clone(), source })?;
+    Ok(Motion::Poses(track))
+}
+
+#[cfg(test)]
+mod tests;

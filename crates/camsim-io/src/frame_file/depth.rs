@@ -1,0 +1,92 @@
+//! Depth pictures as inverse planar depth.
+
+use std::path::Path;
+
+use camsim_core::temporal::IdealGeometry;
+use glam::DVec2;
+use image::DynamicImage;
+
+use super::{
+    DepthEncoding, DepthKind, FrameFileError, FrameSpec,
+    images::{failure, is_exr, list, open, read_exr},
+};
+
+/// Depth of the reference program's cleared buffer, metres: all three bytes full.
+const PACKED24_SKY_M: f64 = 65_281.0;
+
+/// 1/z in 1/m, 0 where there is no depth.
+pub(super) fn read_inverse_depth(
+    path: &Path,
+    spec: &FrameSpec,
+    geometry: &IdealGeometry,
+    frame_path: &Path,
+) -> Result<Vec<f32>, FrameFileError> {
+    let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
+    let (size_px, values, whole) = if is_exr(path) {
+        let (size_px, values) = read_exr_depth(path)?;
+        (size_px, values, false)
+    } else {
+        let picture = open(path)?;
+        let size_px = [picture.width(), picture.height()];
+        match spec.depth_encoding {
+            DepthEncoding::Packed24 => (size_px, packed24(&picture), false),
+            DepthEncoding::Plain => (size_px, whole_numbers(&picture, path)?, true),
+        }
+    };
+    let per_metre = match (spec.depth_per_metre, whole) {
+        (Some(per_metre), _) if per_metre.is_finite() && per_metre > 0.0 => per_metre,
+        (Some(_), _) => return Err(fail("depth_per_metre", "must be a finite number above 0: the stored value of one metre")),
+        (None, false) => 1.0,
+        (None, true) => {
+            return Err(fail(
+                "depth_per_metre",
+                "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
+            ));
+        }
+    };
+    if size_px != geometry.size_px {
+        let [w, h] = geometry.size_px;
+        return Err(failure(
+            path,
+            format!("is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place", size_px[0], size_px[1]),
+        ));
+    }
+    let planar = |(i, value): (usize, f64)| {
+        let depth_m = value / per_metre;
+        let pixel = DVec2::new((i as u32 % size_px[0]).into(), (i as u32 / size_px[0]).into());
+        let slant = match spec.depth_kind {
+            DepthKind::Planar => 1.0,
+            DepthKind::Range => ((pixel - geometry.principal_px) / geometry.focal_px).extend(1.0).length(),
+        };
+        let inverse = slant / depth_m;
+        // Nothing is nearer than a micrometre; what claims to be is no measurement either.
+        if depth_m.is_finite() && depth_m > 1e-6 { inverse as f32 } else { 0.0 }
+    };
+    Ok(values.into_iter().enumerate().map(planar).collect())
+}
+
+/// The channel `Z`, under any layer name, or the only channel.
+fn read_exr_depth(path: &Path) -> Result<([u32; 2], Vec<f64>), FrameFileError> {
+    let picture = read_exr(path)?;
+    let named = |wanted: &str| picture.planes.iter().find(|(name, _)| name.rsplit('.').next() == Some(wanted));
+    // Blender's depth pass is called `Depth.V` when it has a file of its own.
+    let only = || if picture.planes.len() == 1 { picture.planes.first() } else { None };
+    let Some((_, plane)) = named("Z").or_else(|| named("V")).or_else(only) else {
+        return Err(failure(path, format!("has no channel Z, but {}", list(&picture.planes))));
+    };
+    Ok((picture.size_px, plane.iter().map(|&z| f64::from(z)).collect()))
+}
+
+fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
+    match picture {
+        DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
+        _ => Err(failure(path, "is no 16-bit grey picture: give depth as 16-bit PNG or PGM, as EXR, or set depth_encoding = \"packed24\"")),
+    }
+}
+
+/// Decoded texel by texel: packed bytes must never be filtered.
+fn packed24(picture: &DynamicImage) -> Vec<f64> {
+    let depth_m = |[r, g, b]: [u8; 3]| f64::from(r) * 255.0 + f64::from(g) + f64::from(b) / 255.0;
+    let metres = picture.to_rgb8().pixels().map(|pixel| depth_m(pixel.0)).collect::<Vec<_>>();
+    metres.into_iter().map(|z| if z >= PACKED24_SKY_M { 0.0 } else { z }).collect()
+}

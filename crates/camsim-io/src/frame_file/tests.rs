@@ -1,0 +1,114 @@
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+
+use camsim_core::{frame::RenderedFrame, scenario::OutputEncoding, scene::linear_from_srgb};
+
+use super::*;
+use crate::write::write_picture;
+
+/// A folder with a 3x2 picture `c.png`, 16-bit `d.png`, and FRAME.toml of `text`.
+fn folder(text: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbImage::from_fn(3, 2, |x, y| image::Rgb([10 * x as u8, 100 * y as u8, 255])).save(folder.path().join("c.png")).unwrap();
+    let depth = vec![1000_u16, 2000, 0, 4000, 500, 65535];
+    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, depth.clone()).unwrap().save(folder.path().join("d.png")).unwrap();
+    let pgm: Vec<u8> = b"P5\n3 2\n65535\n".iter().copied().chain(depth.iter().flat_map(|v| v.to_be_bytes())).collect();
+    fs::write(folder.path().join("d.pgm"), pgm).unwrap();
+    fs::write(folder.path().join("p.csv"), "t_s,x,y,z,qx,qy,qz,qw\n10,1,2,3,0,0,0,1\n# a comment\n11,2,2,3,0,0,0,-1\n").unwrap();
+    let path = folder.path().join("FRAME.toml");
+    fs::write(&path, text).unwrap();
+    (folder, path)
+}
+
+const GOOD: &str = "color = \"c.png\"\ndepth = \"d.png\"\ndepth_per_metre = 1000\nfocal_px = [2, 2]\n";
+
+fn read(text: &str) -> Result<FrameFile, FrameFileError> {
+    let (_folder, path) = folder(text);
+    read_frame(&path)
+}
+
+#[test]
+fn a_frame_is_read_with_its_defaults() {
+    let file = read(GOOD).unwrap();
+    assert_eq!(file.frame.geometry.principal_px, DVec2::new(1.0, 0.5));
+    assert_eq!(file.frame.inverse_depth, [1.0, 0.5, 0.0, 0.25, 2.0, (1.0_f64 / 65.535) as f32]);
+    assert_eq!(file.frame.color_rgba[4..8], [linear_from_srgb(10.0 / 255.0), 0.0, 1.0, 1.0]);
+    assert_eq!((file.motion, file.fog, file.frame.instant_s), (Motion::Twist(Twist::default()), None, 0.0));
+    assert!((file.without_depth - 1.0 / 6.0).abs() < 1e-12);
+    // The same depth as PGM.
+    assert_eq!(read(&GOOD.replace("d.png", "d.pgm")).unwrap().frame, file.frame);
+}
+
+#[test]
+fn every_key_is_taken() {
+    let text = "color_space = \"linear\"\ndepth_kind = \"range\"\nprincipal_point_px = [0, 0]\ninstant_ms = -20\n\
+                [motion]\nvelocity_m_s = [1, 2, 3]\nangular_rate_rad_s = [0.1, 0.2, 0.3]\n[fog]\nend_m = 9\ncolor = [0.5, 0.6, 0.7]\n";
+    let file = read(&format!("{GOOD}{text}")).unwrap();
+    assert_eq!(file.frame.color_rgba[4], 10.0 / 255.0);
+    // Pixel (1, 1) lies at (0.5, 0.5): its range is longer than its depth by sqrt(1.5).
+    assert!((f64::from(file.frame.inverse_depth[4]) - 2.0 * 1.5_f64.sqrt()).abs() < 1e-6);
+    assert_eq!(file.frame.instant_s, -0.02);
+    let twist = Twist { velocity_m_s: DVec3::new(1.0, 2.0, 3.0), rate_rad_s: DVec3::new(0.1, 0.2, 0.3) };
+    assert_eq!(file.motion, Motion::Twist(twist));
+    assert_eq!(file.fog, Some(LinearFog { end_m: 9.0, color: DVec3::new(0.5, 0.6, 0.7) }));
+    let Motion::Poses(_) = read(&format!("{GOOD}[motion]\ntrajectory = \"p.csv\"\nstamp_s = 10.5\n")).unwrap().motion else {
+        panic!("poses are poses")
+    };
+    let twist = read(&format!("{GOOD}[motion]\ntrajectory = \"p.csv\"\nstamp_s = 10.5\n")).unwrap().motion.twist_at(0.0);
+    assert_eq!(twist, Twist { velocity_m_s: DVec3::X, rate_rad_s: DVec3::ZERO });
+    // Rotation alone needs no depth.
+    assert_eq!(read("color = \"c.png\"\nfocal_px = [2, 2]\n").unwrap().frame.inverse_depth, [0.0; 6]);
+}
+
+#[test]
+fn depth_is_read_from_exr_and_packed_bytes() {
+    let (folder, path) = folder("color = \"out.exr\"\ndepth = \"out.exr\"\nfocal_px = [2, 2]\n");
+    let depth_m = vec![1.0, f32::INFINITY, 4.0, 1e10, f32::NAN, -1.0];
+    let color_rgba: Vec<f32> = (0..24).map(|i| i as f32 / 8.0).collect();
+    let frame = RenderedFrame { size_px: [3, 2], color_rgba: color_rgba.clone(), depth_m: Some(depth_m), ..RenderedFrame::default() };
+    // What `apply` writes is what it reads: linear values beyond 1 and all.
+    write_picture(&folder.path().join("out.exr"), &frame, OutputEncoding::Srgb8).unwrap();
+    let file = read_frame(&path).unwrap();
+    assert_eq!(file.frame.inverse_depth, [1.0, 0.0, 0.25, 1e-10, 0.0, 0.0]);
+    assert_eq!(file.frame.color_rgba[..3], color_rgba[..3]);
+    let error = write_picture(&folder.path().join("out.tga"), &frame, OutputEncoding::Srgb8).unwrap_err().to_string();
+    assert!(error.contains(".exr or .png"), "{error}");
+
+    // 12 * 255 + 34 + 51/255 m, and sky.
+    let packed = image::RgbImage::from_fn(3, 2, |x, _| image::Rgb(if x == 1 { [12, 34, 51] } else { [255; 3] }));
+    packed.save(folder.path().join("p.png")).unwrap();
+    fs::write(&path, "color = \"c.png\"\ndepth = \"p.png\"\ndepth_encoding = \"packed24\"\nfocal_px = [2, 2]\n").unwrap();
+    let file = read_frame(&path).unwrap();
+    assert!((f64::from(file.frame.inverse_depth[1]) * 3094.2 - 1.0).abs() < 1e-6 && file.frame.inverse_depth[0] == 0.0);
+}
+
+#[test]
+fn bad_frames_are_named_by_key_and_file() {
+    for (text, expected) in [
+        ("color = \"c.png\"\n", "focal_px: is missing"),
+        ("colour = \"c.png\"\nfocal_px = [2, 2]\n", "FRAME.toml:1: colour: unknown key; did you mean `color`?"),
+        (&format!("{GOOD}depth_per_meter = 5\n"), "did you mean `depth_per_metre`?"),
+        (&format!("{GOOD}[motion]\nvelocity = [1, 2, 3]\n"), "did you mean `motion.velocity_m_s`?"),
+        (&format!("{GOOD}depth_kind = \"ranged\"\n"), "did you mean \"range\"?"),
+        (&GOOD.replace("[2, 2]", "[2, -2]"), "focal_px: must be"),
+        (&GOOD.replace("depth_per_metre = 1000\n", ""), "depth_per_metre: is missing"),
+        (&GOOD.replace("d.png", "c.png"), "c.png: is no 16-bit grey picture"),
+        (&GOOD.replace("d.png", "no.png"), "no.png: cannot be read"),
+        (&GOOD.replace("c.png", "d.csv"), "d.csv: cannot be read"),
+        ("color = \"c.png\"\nfocal_px = [2, 2]\n[motion]\nvelocity_m_s = [0, 0, 1]\n", "depth: is missing, and the camera moves"),
+        (&format!("{GOOD}[motion]\ntrajectory = \"p.csv\"\n"), "motion.stamp_s: is missing"),
+        (&format!("{GOOD}[motion]\nstamp_s = 3\n"), "motion.trajectory, which is missing"),
+        (&format!("{GOOD}[motion]\nvelocity_m_s = [0, 0, 1]\ntrajectory = \"p.csv\"\nstamp_s = 3\n"), "give one of them"),
+        (&format!("{GOOD}[motion]\ntrajectory = \"c.png\"\nstamp_s = 3\n"), "c.png:1"),
+        (&format!("{GOOD}[motion]\nvelocity_m_s = [0, 0, nan]\n"), "motion.velocity_m_s: must be three finite"),
+        (&format!("{GOOD}[fog]\nend_m = 0\ncolor = [0, 0, 0]\n"), "fog: needs end_m above 0"),
+        ("color = ", "FRAME.toml:1: not valid TOML"),
+    ] {
+        let error = read(text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{text}\n  gives {error}\n  not   {expected}");
+    }
+    let (folder, path) = folder(&GOOD.replace("c.png", "big.png"));
+    image::RgbImage::new(4, 2).save(folder.path().join("big.png")).unwrap();
+    assert!(read_frame(&path).unwrap_err().to_string().contains("d.png: is 3x2, but the colour is 4x2"));
+}
