@@ -246,3 +246,43 @@ fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
     let (code, _, err) = camsim(["track", text(&assets().join("pattern.toml")), "--rate", "1", "-o", text(&below)]);
     assert!(code == 1 && err.contains("traj.csv"), "{err}");
 }
+
+#[test]
+fn somebody_elses_picture_goes_through_the_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::copy(assets().join("acircles.png"), file("ideal.png")).unwrap();
+    let (camera, frame, out) = (file("CAMERA.toml"), file("FRAME.toml"), file("out.png"));
+    fs::write(&camera, "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = 33.0\n").unwrap();
+    let turning = "color = \"ideal.png\"\nfocal_px = [300.0, 300.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 1.0]\n";
+    fs::write(&frame, turning).unwrap();
+    for solver in ["linear", "rk2", "reproject"] {
+        let (code, answer, err) = camsim(["apply", text(&camera), text(&frame), "--solver", solver, "-o", text(&out)]);
+        assert_eq!((code, answer.as_str()), (0, ""), "{err}");
+        assert!(err.contains("64x48"), "{err}");
+    }
+    // The paper's two models of a turn of half a degree differ little, and by something.
+    let other = file("linear.png");
+    assert_eq!(camsim(["-q", "apply", text(&camera), text(&frame), "--solver", "linear", "-o", text(&other)]).0, 0);
+    let (_, report, _) = camsim(["compare", text(&out), text(&other), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert!(report["rmse"].as_f64().unwrap() < 0.02, "{report}");
+    assert_eq!(camsim(["-q", "apply", text(&camera), text(&frame), "--preset", "paper", "-o", text(&file("out.exr"))]).0, 0);
+    assert!(file("out.exr").is_file());
+
+    for (change, wanted) in [
+        (turning.replace("color =", "colour ="), "did you mean `color`?"),
+        (turning.replace("angular_rate_rad_s", "velocity_m_s"), "depth: is missing"),
+        (turning.replace("ideal.png", "none.png"), "none.png: cannot be read"),
+        (format!("{turning}[fog]\nend_m = 10.0\ncolor = [0.0, 0.0, 0.0]\n"), "preset \"paper\""),
+    ] {
+        fs::write(&frame, change).unwrap();
+        let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
+        assert!(code == 2 && err.contains(wanted), "{err}");
+    }
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", "picture.jpg"]);
+    assert!(code == 2 && err.contains(".exr or .png"), "{err}");
+    fs::write(&camera, "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = -33.0\n").unwrap();
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
+    assert!(code == 2 && err.contains("shutter.readout_ms: must be"), "{err}");
+}

@@ -16,7 +16,7 @@ use camsim_core::{
     frame::RenderedFrame,
     photometric::vignette_weights,
     scenario::{CameraSpec, FieldOr, LensModel, LensSpec, PhotometricSpec, Preset, ShutterSpec, Solver},
-    scene::srgb_from_linear,
+    scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
 };
 use camsim_io::{frame_file::read_frame, pictures::read_gray_image};
@@ -145,11 +145,16 @@ enum Fault {
     VignetteBorder,
     /// Sky is decided by the *filtered* alpha, so that horizon pixels mix with the colour that cleared texels hide, or become all sky.
     SkyAfterFilter,
+    /// Filtering there has eight bits, so an alpha within half a level of one half may count as sky ...
+    TieIsSky,
+    /// ... or as ground.
+    TieIsGround,
     /// The fog's ray is taken from the principal point, where the coordinate counts from the middle of the picture.
     FogCentre,
 }
 
-const FAULTS: [Fault; 4] = [Fault::VignetteJump, Fault::VignetteBorder, Fault::SkyAfterFilter, Fault::FogCentre];
+const FAULTS: [Fault; 6] =
+    [Fault::VignetteJump, Fault::VignetteBorder, Fault::SkyAfterFilter, Fault::TieIsSky, Fault::TieIsGround, Fault::FogCentre];
 
 /// Gather, fog and photometric of the paper, written once more, with faults on request.
 struct Model<'a> {
@@ -165,9 +170,15 @@ impl Model<'_> {
         let begin = self.pipeline.source(pixel, -0.5)?;
         let end = self.pipeline.source(pixel, 0.5)?;
         let samples = n("extra_sampling_points") + 2.0;
+        // Alpha below which a filtered texel is sky; `None` decides texel by texel, before filtering.
+        let sky_below = has(Fault::SkyAfterFilter).then(|| match (has(Fault::TieIsSky), has(Fault::TieIsGround)) {
+            (true, false) => 128.0,
+            (false, true) => 127.0,
+            _ => 127.5,
+        });
         let mut sum = DVec3::ZERO;
         for i in 0..samples as u32 {
-            sum += self.color(begin.at_px.lerp(end.at_px, f64::from(i) / (samples - 1.0)), has(Fault::SkyAfterFilter));
+            sum += self.color(begin.at_px.lerp(end.at_px, f64::from(i) / (samples - 1.0)), sky_below);
         }
         let mut color = sum / samples;
         if n("fog_end") > 0.0 {
@@ -183,7 +194,7 @@ impl Model<'_> {
     }
 
     /// Bilinear stored colour in grey levels.
-    fn color(&self, at_px: DVec2, sky_after_filter: bool) -> DVec3 {
+    fn color(&self, at_px: DVec2, sky_below: Option<f64>) -> DVec3 {
         let raw = &self.golden.raw;
         let last = DVec2::new(f64::from(raw.width() - 1), f64::from(raw.height() - 1));
         let at = at_px.clamp(DVec2::ZERO, last);
@@ -193,10 +204,10 @@ impl Model<'_> {
             let weight = (1.0 - (at.x - place.x).abs()) * (1.0 - (at.y - place.y).abs());
             let texel = place.min(last);
             let [r, g, b, a] = raw.get_pixel(texel.x as u32, texel.y as u32).0;
-            let [r, g, b] = if a < 128 && !sky_after_filter { SKY } else { [r, g, b] };
+            let [r, g, b] = if a < 128 && sky_below.is_none() { SKY } else { [r, g, b] };
             sum += weight * glam::DVec4::new(f64::from(r), f64::from(g), f64::from(b), f64::from(a));
         }
-        if sky_after_filter && sum.w < 127.5 { DVec3::new(0.65, 0.85, 1.0) * 255.0 } else { sum.truncate() }
+        if sky_below.is_some_and(|alpha| sum.w < alpha) { DVec3::new(0.65, 0.85, 1.0) * 255.0 } else { sum.truncate() }
     }
 
     fn vignette(&self, [x, y]: [u32; 2], jump: bool, border: bool) -> f64 {
@@ -322,10 +333,25 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
         );
         assert_eq!(within.iter().sum::<u32>() + empty + explained + missed, all);
         // An explanation is for the few; these are frames of the same picture.
-        assert!(f64::from(explained) < 0.01 * f64::from(all), "{}: {explained}", golden.name);
+        assert!(f64::from(explained) < 0.015 * f64::from(all), "{}: {explained}", golden.name);
         unexplained.push((golden.name.clone(), missed));
     }
     assert!(unexplained.iter().all(|(_, count)| *count == 0), "{unexplained:?}");
+}
+
+/// The ideal frame as it should have come: with its fog.
+fn in_fog(golden: &Golden) -> IdealFrame {
+    let mut ideal = golden.ideal.clone();
+    let Some(fog) = &golden.paper.fog else { return ideal };
+    let geometry = ideal.geometry;
+    for (i, (color, w)) in ideal.color_rgba.chunks_exact_mut(4).zip(&ideal.inverse_depth).enumerate() {
+        let at_px = DVec2::new((i as u32 % geometry.size_px[0]).into(), (i as u32 / geometry.size_px[0]).into());
+        let range_m = ((at_px - geometry.principal_px) / geometry.focal_px).extend(1.0).length() / f64::from(*w);
+        let stored = DVec3::from_array([color[0], color[1], color[2]].map(|v| f64::from(srgb_from_linear(v))));
+        let foggy = fog.over(stored, range_m).to_array().map(|v| linear_from_srgb(v as f32));
+        color[..3].copy_from_slice(&foggy);
+    }
+    ideal
 }
 
 /// camsim's own methods on the same inputs: how far the paper's source coordinates are from the exact ones, and the pictures from each other.
@@ -336,8 +362,8 @@ fn own_methods_beside_the_reference_programs() {
         "| case | rk2 from exact, p50 px | p99 | max | levels RMS | share > 2 | with stored values RMS | share > 2 |\n|---|---|---|---|---|---|---|---|"
     );
     for golden in &goldens {
-        let own = Settings { fog: None, ..Settings::default() };
-        let exact = Pipeline::new(&golden.spec, &golden.ideal, &golden.motion, &own).unwrap();
+        let ideal = in_fog(golden);
+        let exact = Pipeline::new(&golden.spec, &ideal, &golden.motion, &Settings::default()).unwrap();
         let heun = Pipeline::new(&golden.spec, &golden.ideal, &golden.motion, &golden.paper).unwrap();
         let stored = Settings { solver: Some(Solver::Reproject), ..golden.paper.clone() };
         let stored = Pipeline::new(&golden.spec, &golden.ideal, &golden.motion, &stored).unwrap();
