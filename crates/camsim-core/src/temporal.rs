@@ -1,6 +1,7 @@
 //! Temporal inverse and gather: output ray + instant -> where to look in the ideal frame (paper section 6).
 //!
-//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`.
+//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`; the paper's own models are in
+//! [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
 
