@@ -40,14 +40,23 @@ struct Frame {
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
+    // Largest rotation of a step of the rk2 solver.
+    rk2_step_rad: f32,
+    // p1 p2 of the lens, for the lens inverse of the paper preset.
+    lens_tangential: vec2<f32>,
     // Key camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
     ned_from_key_z: vec4<f32>,
+    // The key camera's motion in its own axes, for the solvers that take it as constant: velocity of the optical centre; angular rate, and
+    // its length in w.
+    key_velocity_m_s: vec4<f32>,
+    key_rate_rad_s: vec4<f32>,
+    // k1 k2 k3 of the lens.
+    lens_radial: vec4<f32>,
+    // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0 = clear).
+    linear_fog: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

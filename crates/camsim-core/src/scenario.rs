@@ -189,7 +189,9 @@ pub struct QualitySpec {
     pub max_terrain_error_px: f64,
     /// Temporal solver.
     pub solver: Auto<Solver>,
-    /// Exposure samples per pixel.
+    /// Depth look-ups of `reproject`.
+    pub iterations: Auto<u32>,
+    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure.
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel.
     pub footprint_taps: Auto<u32>,
@@ -205,6 +207,7 @@ impl Default for QualitySpec {
             max_error_dn: 1.0,
             max_terrain_error_px: 0.25,
             solver: Auto::Auto,
+            iterations: Auto::Auto,
             blur_samples: Auto::Auto,
             footprint_taps: Auto::Auto,
             key_frames: Auto::Auto,
@@ -219,7 +222,9 @@ pub enum Preset {
     /// The cheapest methods that keep the tolerances.
     #[default]
     Default,
-    /// The paper's own methods and approximations.
+    /// The paper's own methods and approximations, as a base to measure against; [`crate::plan::paper`] lists them. It fixes the solver
+    /// (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the samples of an exposure (100), and the tolerances choose
+    /// nothing but the terrain's level of detail.
     Paper,
 }
 
