@@ -193,7 +193,7 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &scenario, "--shard", "5/4"], "I from 1 to N"),
         (vec!["render", &scenario, "--outputs", "colour"], "coords"),
         (vec!["render", &scenario, "--format", "none,png"], "stands alone"),
-        (vec!["render", &scenario, "--backend", "reference"], "not in this version"),
+        (vec!["render", &scenario, "--backend", "gpu", "--set", "quality.solver=oracle"], "leave --backend out"),
         (vec!["render", &scenario, "--preset", "paper"], "quality.preset"),
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),

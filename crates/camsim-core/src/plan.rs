@@ -261,10 +261,8 @@ impl Planner {
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
         let key_pose = path.pose(key_s);
-        let key_twist = Twist {
-            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
-            rate_rad_s: path.rate_camera(key_s),
-        };
+        let key_twist =
+            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
         let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene, demanded.map(|stage| (stage, key_twist)));
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
@@ -274,8 +272,8 @@ impl Planner {
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = ray_stage(&reach, &mut skipped);
-        let temporal = demanded
-            .unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
+        let temporal =
+            demanded.unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
         let blur = forced::blur_stage(temporal, blur, quality, &motion);
         let edges =

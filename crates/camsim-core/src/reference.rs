@@ -25,8 +25,6 @@ mod meshes;
 mod paint;
 mod ray;
 mod render;
-#[cfg(test)]
-mod tests;
 
 use clock::Clock;
 use eye::Eye;
@@ -136,6 +134,12 @@ impl Oracle {
             paint: Paint::new(scene),
             sequence,
         })
+    }
+
+    /// What renders, for people, in place of an adapter's name.
+    #[must_use]
+    pub fn describe() -> String {
+        format!("reference (f64 rays, {} threads)", rayon::current_num_threads())
     }
 
     /// The sequence.
