@@ -66,7 +66,7 @@ fn rays_agree_with_a_look_at_every_triangle() {
             other => panic!("{i}: {other:?}"),
         }
     }
-    assert!(hits > 3000 && misses > 100, "{hits} {misses}");
+    assert!(hits > 2500 && misses > 1000, "{hits} {misses}");
 }
 
 /// Steep views through every vertex and along every edge of a grid: rays do not slip through where triangles meet.
@@ -76,8 +76,8 @@ fn no_ray_slips_through_at_vertices_and_edges() {
     let oracle = Oracle::new(sequence(scenario(), Steady::standing(DVec3::ZERO), scene)).unwrap();
     for (tilt_n, tilt_e) in [(0.0, 0.0), (0.3, -0.2), (1.0, 1.0)] {
         // Quarters of a cell: vertices, middles of edges and of diagonals.
-        for i in -32..=32 {
-            for j in -32..=32 {
+        for i in -16..=16 {
+            for j in -16..=16 {
                 let above = DVec3::new(2.5 * f64::from(i) - 1000.0 * tilt_n, 2.5 * f64::from(j) - 1000.0 * tilt_e, -1000.0);
                 assert!(oracle.cast(above, DVec3::new(tilt_n, tilt_e, 1.0)).is_some(), "{i} {j} {tilt_n} {tilt_e}");
             }
