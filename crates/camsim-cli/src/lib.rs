@@ -1,7 +1,8 @@
 //! The camsim command line: arguments -> scenario -> engine -> writers.
 //!
 //! Each command is one file in `commands/` with its arguments and a `run`. Everything else is shared: [`console`] (where text goes),
-//! [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list` (`--frames`), `render_run` (engine to output folder).
+//! [`failure`] (exit codes), `inputs` (scenario and loading), `frame_list` (`--frames`), `frame_source` (what
+//! renders), `render_run` (from there to an output folder).
 
 use std::{
     ffi::OsString,
@@ -15,6 +16,7 @@ mod commands;
 pub mod console;
 pub mod failure;
 mod frame_list;
+mod frame_source;
 mod inputs;
 mod output;
 mod progress;

@@ -1,4 +1,4 @@
-//! A sequence through the engine into an output folder.
+//! A sequence through a renderer into an output folder.
 
 use std::{
     path::Path,
@@ -8,16 +8,17 @@ use std::{
 
 use anyhow::anyhow;
 use camsim_core::{plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
-use camsim_gpu::{Engine, engine::Finished};
+use camsim_gpu::engine::Finished;
 use camsim_io::{
     manifest::{ResumeError, RunManifest, check_resume, in_shard},
-    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
+    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, camera_toml, frames_csv, trajectory_csv, write_atomic},
 };
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
     frame_list::Shard,
+    frame_source::FrameSource,
     progress::frames_bar,
 };
 
@@ -60,20 +61,24 @@ impl Outcome {
 }
 
 /// Renders; `look` sees each finished frame before it is written.
-pub fn run(job: &Job<'_>, engine: &Engine, console: &mut Console<'_>, look: &mut dyn FnMut(&Finished)) -> Result<Outcome, Failure> {
+pub fn run(
+    job: &Job<'_>,
+    source: &mut dyn FrameSource,
+    console: &mut Console<'_>,
+    look: &mut dyn FnMut(&Finished),
+) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
     let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
     check_folder(job, console)?;
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
-    let mut session = engine.session::<WriteError>(job.sequence.clone(), &scenario.output.channels)?;
     // What cannot be planned is refused before anything is written.
     if let Some(&first) = todo.first() {
-        session.planner().plan(first).or_bad_input()?;
+        source.planner().plan(first).or_bad_input()?;
     }
     let mut manifest = RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        adapter: engine.gpu().adapter.to_string(),
+        adapter: source.adapter(),
         seed: scenario.seed,
         scenario: scenario.clone(),
         frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
@@ -84,14 +89,14 @@ pub fn run(job: &Job<'_>, engine: &Engine, console: &mut Console<'_>, look: &mut
         warnings: job.warnings.to_vec(),
     };
     manifest.write(job.folder).or_failed()?;
-    write_tables(job, &files, session.planner())?;
+    write_tables(job, &files, source.planner())?;
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
     let mut blind = 0_u64;
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
-    let rendered = session.render(todo.iter().copied(), &mut |finished| {
+    let rendered = source.render(&todo, &mut |finished| {
         look(&finished);
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         bar.inc(1);

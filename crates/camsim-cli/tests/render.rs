@@ -72,3 +72,55 @@ fn timing_runs_write_no_frame() {
     assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
     assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
 }
+
+/// Set in the copy of this test that runs where no adapter can be found.
+const WITHOUT_ADAPTER: &str = "CAMSIM_TEST_WITHOUT_ADAPTER";
+
+/// Also where there is no adapter, and with the bytes of one run whatever the shards.
+#[test]
+fn the_reference_renders_without_an_adapter() {
+    if std::env::var_os(WITHOUT_ADAPTER).is_none() {
+        let again = std::process::Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "the_reference_renders_without_an_adapter"])
+            .env(WITHOUT_ADAPTER, "1")
+            .env("VK_ICD_FILENAMES", "/nonexistent")
+            .env("VK_DRIVER_FILES", "/nonexistent")
+            .env("CAMSIM_ADAPTER", "no such adapter")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&again.stdout);
+        assert!(again.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&again.stderr));
+        return;
+    }
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = |name: &str| temporary.path().join(name);
+    let (whole, parts) = (folder("whole"), folder("parts"));
+    let render = |folder: &Path, more: &[&str]| {
+        let common = ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--outputs", "color,depth,coords,rows"];
+        let small =
+            ["--set", "camera.size_px=[48, 36]", "--set", "camera.focal_px=[32, 32]", "--set", "camera.principal_point_px=[23.5, 17.5]"];
+        camsim(&[&common[..], &small, more].concat())
+    };
+    let (code, _, err) = render(&folder("engine"), &["--frames", "2"]);
+    assert_eq!(code, 3, "there should be no adapter here: {err}");
+
+    let (code, out, err) = render(&whole, &["--frames", "2..5", "--backend", "reference"]);
+    assert!(code == 0 && out.starts_with("3 frames in"), "{out}{err}");
+    for shard in ["2/2", "1/2"] {
+        let (code, out, err) = render(&parts, &["--frames", "2..5", "--shard", shard, "--set", "quality.solver=oracle"]);
+        assert!(code == 0, "{out}{err}");
+    }
+    fs::remove_file(parts.join("depth/frame_000003.exr")).unwrap();
+    let (code, out, err) = render(&parts, &["--frames", "2..5", "--resume", "--backend", "reference"]);
+    assert!(code == 0 && out.starts_with("1 frames (2 were there already)"), "{out}{err}");
+    for frame in 2..5 {
+        for channel in ["color", "depth", "coords"] {
+            let file = format!("{channel}/frame_{frame:06}.exr");
+            assert_eq!(bytes(&whole, &file), bytes(&parts, &file), "{file}");
+        }
+    }
+    let run = run_json(&whole);
+    assert!(run["adapter"].as_str().is_some_and(|adapter| adapter.starts_with("reference (f64 rays, ")), "{run}");
+    assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
+}

@@ -12,6 +12,7 @@ use camsim_io::{
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
+    frame_source::Device,
     inputs::{self, ScenarioArgs},
     render_run::{self, Job},
 };
@@ -48,7 +49,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let mut thumbnails = Vec::new();
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;
-    let outcome = render_run::run(&job, &engine, console, &mut |finished| {
+    let outcome = render_run::run(&job, &mut Device::new(&engine, &loaded.sequence)?, console, &mut |finished| {
         if seen % every == 0 && thumbnails.len() < SHEET_FRAMES {
             thumbnails.push(finished.frame.clone());
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_core::scenario::{Channel, ImageFormat, Scenario};
+use camsim_core::scenario::{Auto, Channel, ImageFormat, Scenario, Solver};
 use camsim_gpu::{AdapterChoice, Engine};
 use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -12,6 +12,7 @@ use crate::{
     console::Console,
     failure::{Failure, OrFail},
     frame_list::{FrameList, Shard},
+    frame_source::{Device, FrameSource, Rays},
     inputs::{self, Changes, ScenarioArgs},
     render_run::{self, Job},
 };
@@ -28,6 +29,8 @@ Examples:
   camsim render flight.toml --set camera.lens.model=pinhole --set 'camera.lens.coefficients=[]'
   camsim render flight.toml -o out --shard 2/4        the second of four machines
   camsim render flight.toml -o out --resume           only what is missing
+  camsim render flight.toml --backend reference --frames 7
+                                                      exactly and slowly, without a graphics adapter
   camsim render --print-default > flight.toml         a scenario to begin with")]
 pub struct Args {
     /// Scenario (TOML)
@@ -41,9 +44,9 @@ pub struct Args {
     frames: Option<FrameList>,
     #[command(flatten)]
     changes: Changes,
-    /// What renders
-    #[arg(long, value_enum, default_value_t = Backend::Gpu)]
-    backend: Backend,
+    /// What renders; gpu if left out, or reference where quality.solver is "oracle"
+    #[arg(long, value_enum)]
+    backend: Option<Backend>,
     /// Channels instead of output.channels
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = channel_parser())]
     outputs: Option<Vec<Channel>>,
@@ -65,7 +68,7 @@ pub struct Args {
 enum Backend {
     /// The engine on wgpu, also on a software adapter
     Gpu,
-    /// The slow exact renderer (not in this version)
+    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as quality.solver = "oracle"
     Reference,
 }
 
@@ -94,19 +97,14 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let Some(path) = args.scenario.clone() else {
         return Ok(console.print(&print_default())?);
     };
-    if args.backend == Backend::Reference {
-        return Err(Failure::bad_input(anyhow!("--backend reference is not in this version; leave it out to render with the gpu backend")));
-    }
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
     let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read()?;
-    let scenario = with_outputs(scenario, args)?;
+    let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames = match &args.frames {
         None => (0..loaded.sequence.frames).collect(),
         Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
     };
-    let engine = Engine::new(AdapterChoice::Best)?;
-    console.detail(format_args!("adapter: {}", engine.gpu().adapter));
     let job = Job {
         sequence: &loaded.sequence,
         folder: &folder,
@@ -115,7 +113,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         resume: args.resume,
         warnings: &loaded.warnings,
     };
-    let outcome = render_run::run(&job, &engine, console, &mut |_| {})?;
+    let engine;
+    let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+        Box::new(Rays::new(&loaded.sequence)?)
+    } else {
+        engine = Engine::new(AdapterChoice::Best)?;
+        Box::new(Device::new(&engine, &loaded.sequence)?)
+    };
+    console.detail(format_args!("adapter: {}", source.adapter()));
+    let outcome = render_run::run(&job, &mut *source, console, &mut |_| {})?;
     if !console.is_quiet() {
         let kept = if outcome.skipped > 0 { format!(" ({} were there already)", outcome.skipped) } else { String::new() };
         let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
@@ -130,6 +136,21 @@ fn default_folder(scenario: &Path) -> PathBuf {
     let mut name = scenario.file_stem().unwrap_or("camsim".as_ref()).to_owned();
     name.push("-frames");
     PathBuf::from(name)
+}
+
+/// `--backend reference` is written into the scenario, so that frames of the two backends never mix in one folder.
+fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scenario, Failure> {
+    let oracle = Auto::Value(Solver::Oracle);
+    match backend {
+        Some(Backend::Reference) => scenario.quality.solver = oracle,
+        Some(Backend::Gpu) if scenario.quality.solver == oracle => {
+            return Err(Failure::bad_input(anyhow!(
+                "quality.solver is \"oracle\", which --backend gpu does not have: leave --backend out, or change the solver (--set quality.solver=auto)"
+            )));
+        }
+        _ => {}
+    }
+    Ok(scenario)
 }
 
 /// `--outputs` and `--format` in place of `[output]`.

@@ -117,7 +117,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.max_error_px", Number),
     ("quality.max_error_dn", Number),
     ("quality.max_terrain_error_px", Number),
-    ("quality.solver", Word(&["auto", "linear", "rk2", "reproject"])),
+    ("quality.solver", Word(&["auto", "linear", "rk2", "reproject", "oracle"])),
     ("quality.iterations", WholeOr(AUTO)),
     ("quality.blur_samples", WholeOr(AUTO)),
     ("quality.footprint_taps", WholeOr(AUTO)),
@@ -129,8 +129,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
 ];
 
 /// Words that the format knows and this version does not.
-pub(super) const LATER_WORDS: &[(&str, &str)] =
-    &[("quality.solver", "oracle"), ("flight.format", "ulog"), ("flight.format", "gpx"), ("output.channels", "flow")];
+pub(super) const LATER_WORDS: &[(&str, &str)] = &[("flight.format", "ulog"), ("flight.format", "gpx"), ("output.channels", "flow")];
 
 /// Keys without which there is nothing to run, under the table that makes them necessary.
 pub(super) const REQUIRED: &[(&str, &str)] = &[
