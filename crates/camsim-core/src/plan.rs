@@ -22,13 +22,18 @@ use crate::{
 
 mod bounds;
 mod describe;
+mod dry_run;
 mod edges;
+mod error;
 mod lines;
 mod motion;
+mod probes;
+mod rounding;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
+pub use error::Predicted;
 pub use lines::{LinePoses, line_poses, row_records};
 
 /// Nearest distance that the ideal frame can show, metres.
@@ -167,6 +172,11 @@ pub struct FramePlan {
     pub truth: bool,
     /// What the choices rest on.
     pub motion: Motion,
+    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px`, or less where the parallax within the
+    /// frame would turn the difference into an error of the coordinates.
+    pub terrain_error_px: f64,
+    /// How far the pixels' sources will be off.
+    pub predicted: Predicted,
     /// What is not done.
     pub skipped: Vec<Skip>,
 }
@@ -262,10 +272,12 @@ impl Planner {
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = ray_stage(&reach, &mut skipped);
-        let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
+        let case = error::Case { reach: &reach, sequence: &self.sequence, shutter: &self.shutter, stamp_s, key_s, key_pose: &key_pose, ideal: &ideal, ray, blur };
+        let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, &motion, edges);
+        motion::note_skips(&motion, temporal, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
@@ -285,6 +297,8 @@ impl Planner {
             max_taps: quality.footprint_taps.value().unwrap_or(4).max(1),
             truth: self.truth,
             motion,
+            terrain_error_px,
+            predicted,
             skipped,
         })
     }

@@ -92,31 +92,20 @@ fn blur_path(
     (longest, sagitta)
 }
 
-/// The cheapest temporal inverse within the tolerance.
-pub(super) fn temporal_stage(motion: &Motion, quality: &QualitySpec, focal_px: f64, skipped: &mut Vec<Skip>) -> TemporalStage {
-    let negligible_px = NEGLIGIBLE * quality.max_error_px;
-    if motion.parallax_px > negligible_px {
-        return TemporalStage::Reproject { iterations: iterations(motion.parallax_px, focal_px, negligible_px) };
+/// What the choice of a temporal inverse leaves out, and why nothing is lost.
+pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut Vec<Skip>) {
+    if matches!(temporal, TemporalStage::Rotation | TemporalStage::Identity) {
+        skipped.push(Skip {
+            what: "depth in the temporal inverse",
+            reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px),
+        });
     }
-    skipped.push(Skip {
-        what: "depth in the temporal inverse",
-        reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px),
-    });
-    if motion.rotation_px > negligible_px {
-        return TemporalStage::Rotation;
+    if temporal == TemporalStage::Identity {
+        skipped.push(Skip {
+            what: "temporal inverse",
+            reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
+        });
     }
-    skipped.push(Skip {
-        what: "temporal inverse",
-        reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
-    });
-    TemporalStage::Identity
-}
-
-/// Depth look-ups so that `rho^n * parallax` is negligible. The contraction rho is `parallax * |grad w| / w`; on a surface seen at up to
-/// about 70 deg from its normal `|grad w| / w <= 3 / f`.
-fn iterations(parallax_px: f64, focal_px: f64, negligible_px: f64) -> u32 {
-    let rho = (3.0 * parallax_px / focal_px).clamp(0.01, 0.5);
-    ((negligible_px / parallax_px).ln() / rho.ln()).ceil().clamp(2.0, 8.0) as u32
 }
 
 /// Nodes and samples of the exposure, or `None` when it does not show.

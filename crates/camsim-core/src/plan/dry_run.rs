@@ -1,0 +1,261 @@
+//! The reverse pipeline run dry at one probe: the temporal inverse in f64 over the very texels that the ideal frame will hold, beside the
+//! place where the probe's own ray, cast from its own line's pose, truly looks.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::probes::Probe;
+use crate::{
+    mount::CameraPath,
+    pose::CameraPose,
+    scene::{ChunkDraw, LodSelection, Scene, Terrain, TerrainHit},
+    shutter::Shutter,
+    temporal::{
+        IdealGeometry, blend_inverse_depths,
+        displacement::{RK2_STEP_DEG, Twist, linear, rk2},
+    },
+};
+
+/// Look-ups that are tried.
+pub(super) const MAX_LOOK_UPS: usize = 8;
+/// A step of depth to a neighbour, relative to the nearer, beyond what one surface has; and how far neighbours are.
+const STEP: f64 = 0.02;
+const NEAR_PX: [f64; 2] = [1.5, 3.0];
+/// Relative difference of depth beyond which something else stands before a point.
+const HIDDEN: f64 = 1e-3;
+
+/// A frame to be tried.
+#[derive(Clone, Copy)]
+pub(super) struct Trial<'a> {
+    pub scene: &'a Scene,
+    pub path: &'a CameraPath,
+    pub shutter: &'a Shutter,
+    pub stamp_s: f64,
+    pub key_s: f64,
+    pub key_pose: &'a CameraPose,
+    pub ideal: &'a IdealGeometry,
+    /// The terrain as it will be drawn.
+    pub lod: &'a LodSelection,
+    /// Motion of the key camera, if the paper's models are to be tried.
+    pub twist: Option<Twist>,
+    /// Errors beyond this are looked into: are they a silhouette's?
+    pub suspect_px: f64,
+}
+
+/// How far each way of solving looks from the truth, ideal pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
+    /// True source.
+    pub at_px: DVec2,
+    /// Inverse planar depth in the line's camera, 1/m.
+    pub inverse_depth: f64,
+    /// One pose for all lines.
+    pub still_px: f64,
+    /// After n depth look-ups; none: each line's rotation alone.
+    pub after: [f64; MAX_LOOK_UPS + 1],
+    /// The part of it that more look-ups would mend.
+    pub unsettled: [f64; MAX_LOOK_UPS + 1],
+    /// What the level of detail moves the source by.
+    pub level_of_detail_px: f64,
+    /// Equation 16 and equation 18.
+    pub linear_px: f64,
+    pub rk2_px: f64,
+    /// Displacement by parallax.
+    pub parallax_px: f64,
+    /// At a silhouette, or not seen from the key pose.
+    pub at_silhouette: bool,
+}
+
+/// Where a ray first meets something.
+#[derive(Clone, Copy)]
+struct Met {
+    /// Planar depth for a direction with z = 1 in its camera.
+    depth_m: f64,
+    surface: usize,
+    terrain: Option<TerrainHit>,
+}
+
+/// The key frame's depth, texel by texel, found when asked for.
+struct KeyDepth<'a> {
+    trial: &'a Trial<'a>,
+    known: Vec<([i64; 2], f64)>,
+}
+
+impl Trial<'_> {
+    /// Runs one probe; `None` where its ray has no source in the ideal frame.
+    pub fn run(&self, probe: &Probe) -> Option<Outcome> {
+        let t_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
+        let pose = self.path.pose(t_s);
+        let (rotation, shift) = pose.relative_to(self.key_pose);
+        let direction = rotation * probe.uv.extend(1.0);
+        let met = meet(self.scene, pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
+        let w = met.map_or(0.0, |met| 1.0 / met.depth_m);
+        let in_key = direction + w * shift;
+        let truth_px = self.ideal.px_from_point(in_key);
+        if in_key.z <= 0.0 || !self.ideal.contains(truth_px) {
+            return None;
+        }
+        let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth_px) } else { f64::INFINITY };
+        let rotated_px = self.ideal.px_from_point(direction);
+        let mut outcome = Outcome {
+            at_px: truth_px,
+            inverse_depth: w,
+            still_px: off(self.ideal.px_from_point(probe.uv.extend(1.0))),
+            parallax_px: off(rotated_px),
+            ..Outcome::default()
+        };
+        let mut depth = KeyDepth { trial: self, known: Vec::with_capacity(16) };
+        let places = settle(probe.uv, (rotation, shift), self.ideal, &mut depth);
+        outcome.after = places.map(off);
+        let settled_px = places[MAX_LOOK_UPS];
+        outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
+        if let Some(twist) = &self.twist {
+            let dt_s = t_s - self.key_s;
+            let w = depth.inverse_depth(self.ideal.px_from_point(probe.uv.extend(1.0)));
+            outcome.linear_px = off(self.ideal.px_from_point(linear(probe.uv, w, twist, dt_s).extend(1.0)));
+            outcome.rk2_px = off(self.ideal.px_from_point(rk2(probe.uv, w, twist, dt_s, RK2_STEP_DEG.to_radians()).extend(1.0)));
+        }
+        outcome.level_of_detail_px = self.level_of_detail_px(truth_px, (direction, shift));
+        if outcome.after[MAX_LOOK_UPS] > self.suspect_px {
+            outcome.at_silhouette = self.is_hidden(in_key, w) || self.near_a_step(probe, &pose, met);
+        }
+        Some(outcome)
+    }
+
+    /// How far the middle of stretch `k` of the path over the exposure is from the middle of its chord, for a surface of the probe's depth.
+    pub fn chord_px(&self, probe: &Probe, run: &Outcome, k: u32, segments: u32) -> f64 {
+        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
+        let place = |along: f64| {
+            let t_s = mid_s + self.shutter.exposure_s() * (along / f64::from(segments) - 0.5);
+            let (rotation, shift) = self.path.pose(t_s).relative_to(self.key_pose);
+            self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + run.inverse_depth * shift)
+        };
+        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|share| place(f64::from(k) + share));
+        let miss_px = middle.distance(0.5 * (begin + end));
+        if miss_px.is_finite() { miss_px } else { 0.0 }
+    }
+
+    /// Directions from the key camera, towards an ideal pixel, z = 1 in the camera, NED.
+    fn key_ray(&self, at_px: DVec2) -> DVec3 {
+        self.key_pose.ned_from_camera * ((at_px - self.ideal.principal_px) / self.ideal.focal_px).extend(1.0)
+    }
+
+    /// What the level of detail changes at the true source: depth there, and so parallax.
+    fn level_of_detail_px(&self, truth_px: DVec2, (direction, shift): (DVec3, DVec3)) -> f64 {
+        let Some(terrain) = self.scene.terrain.as_ref().filter(|_| self.lod.max_error_px > 0.0) else { return 0.0 };
+        let ray = self.key_ray(truth_px);
+        let Some(Met { depth_m, terrain: Some(hit), .. }) = meet(self.scene, self.key_pose.position_ned_m, ray) else { return 0.0 };
+        let drawn_m = self.drawn_depth_m(terrain, &hit, self.key_pose.position_ned_m, ray);
+        // w of the line's camera, as `reproject` finds it from the key's.
+        let inverse = |depth_m: f64| direction.z / (depth_m - shift.z).max(1e-9);
+        let moved = |w: f64| self.ideal.px_from_point(direction + w * shift);
+        moved(inverse(drawn_m)).distance(moved(inverse(depth_m)))
+    }
+
+    fn drawn_depth_m(&self, terrain: &Terrain, hit: &TerrainHit, origin_ned_m: DVec3, ray_ned: DVec3) -> f64 {
+        match self.drawn(hit.chunk) {
+            Some(draw) => terrain.drawn_t(hit, draw, origin_ned_m, ray_ned),
+            None => hit.t,
+        }
+    }
+
+    fn drawn(&self, chunk: u32) -> Option<&ChunkDraw> {
+        let draws = &self.lod.draws;
+        draws.binary_search_by_key(&chunk, |draw| draw.chunk).ok().map(|i| &draws[i])
+    }
+
+    /// Whether the key camera sees something else before a point, given in its coordinates times `w`.
+    fn is_hidden(&self, in_key: DVec3, w: f64) -> bool {
+        let seen = meet(self.scene, self.key_pose.position_ned_m, self.key_pose.ned_from_camera * (in_key / in_key.z));
+        match seen {
+            Some(seen) => w == 0.0 || seen.depth_m < (1.0 - HIDDEN) * in_key.z / w,
+            None => false,
+        }
+    }
+
+    /// Whether the line's own camera sees a step of depth within a few pixels.
+    fn near_a_step(&self, probe: &Probe, pose: &CameraPose, here: Option<Met>) -> bool {
+        let look = |offset_px: DVec2| {
+            let uv = probe.uv + probe.uv_from_px * offset_px;
+            meet(self.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
+        };
+        let steps = |there: Option<Met>| match (here, there) {
+            (Some(a), Some(b)) => a.surface != b.surface || (a.depth_m - b.depth_m).abs() > STEP * a.depth_m.min(b.depth_m),
+            (None, None) => false,
+            _ => true,
+        };
+        NEAR_PX.iter().any(|&px| (-1..=1).any(|y| (-1..=1).any(|x| steps(look(px * DVec2::new(f64::from(x), f64::from(y)))))))
+    }
+}
+
+/// The places looked at: after no look-up, after one and so on. The same steps as [`crate::temporal::reproject`].
+fn settle(
+    uv: DVec2,
+    (rotation, shift): (DMat3, DVec3),
+    ideal: &IdealGeometry,
+    depth: &mut KeyDepth<'_>,
+) -> [DVec2; MAX_LOOK_UPS + 1] {
+    let direction = rotation * uv.extend(1.0);
+    let mut w = 0.0;
+    let mut at_px = ideal.px_from_point(direction);
+    let mut last_px = DVec2::INFINITY;
+    std::array::from_fn(|n| {
+        // A place that gives itself again will do so for ever.
+        if n > 0 && at_px != last_px {
+            last_px = at_px;
+            let found = depth.inverse_depth(at_px);
+            let scale = 1.0 - shift.z * found;
+            if scale > 1e-3 {
+                w = found * direction.z / scale;
+            }
+            at_px = ideal.px_from_point(direction + w * shift);
+        }
+        at_px
+    })
+}
+
+impl KeyDepth<'_> {
+    fn inverse_depth(&mut self, at_px: DVec2) -> f64 {
+        if !at_px.is_finite() {
+            return 0.0;
+        }
+        let [width, height] = self.trial.ideal.size_px.map(i64::from);
+        let last = DVec2::new((width - 1) as f64, (height - 1) as f64);
+        let at = at_px.clamp(DVec2::ZERO, last);
+        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
+        let [x, y] = [base.x as i64, base.y as i64];
+        let texels = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]].map(|[x, y]| self.texel([x.min(width - 1), y.min(height - 1)]));
+        blend_inverse_depths(texels, at - base)
+    }
+
+    fn texel(&mut self, texel: [i64; 2]) -> f64 {
+        if let Some((_, w)) = self.known.iter().find(|(known, _)| *known == texel) {
+            return *w;
+        }
+        let trial = self.trial;
+        let origin = trial.key_pose.position_ned_m;
+        let ray = trial.key_ray(DVec2::new(texel[0] as f64, texel[1] as f64));
+        let w = match (meet(trial.scene, origin, ray), &trial.scene.terrain) {
+            (None, _) => 0.0,
+            (Some(Met { terrain: Some(hit), .. }), Some(terrain)) => 1.0 / trial.drawn_depth_m(terrain, &hit, origin, ray),
+            (Some(met), _) => 1.0 / met.depth_m,
+        };
+        self.known.push((texel, w));
+        w
+    }
+}
+
+/// First surface along a ray.
+fn meet(scene: &Scene, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
+    let mut first = scene
+        .terrain
+        .as_ref()
+        .and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY))
+        .map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) });
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        let limit = first.map_or(f64::INFINITY, |met| met.depth_m);
+        if let Some((t, _)) = mesh.intersect(origin_ned_m, direction_ned, limit) {
+            first = Some(Met { depth_m: t, surface: 1 + i, terrain: None });
+        }
+    }
+    first
+}
