@@ -3,16 +3,13 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::probes::Probe;
+use super::{TemporalStage, probes::Probe};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
     scene::{ChunkDraw, LodSelection, Scene, Terrain, TerrainHit},
     shutter::Shutter,
-    temporal::{
-        IdealGeometry, blend_inverse_depths,
-        displacement::{RK2_STEP_DEG, Twist, linear, rk2},
-    },
+    temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
 };
 
 /// Look-ups that are tried.
@@ -35,8 +32,8 @@ pub(super) struct Trial<'a> {
     pub ideal: &'a IdealGeometry,
     /// The terrain as it will be drawn.
     pub lod: &'a LodSelection,
-    /// Motion of the key camera, if the paper's models are to be tried.
-    pub twist: Option<Twist>,
+    /// Motion of the camera at the key instant, for the paper's models.
+    pub twist: Twist,
     /// Errors beyond this are looked into: are they a silhouette's?
     pub suspect_px: f64,
 }
@@ -108,12 +105,15 @@ impl Trial<'_> {
         outcome.after = places.map(off);
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
-        if let Some(twist) = &self.twist {
-            let dt_s = t_s - self.key_s;
-            let w = depth.inverse_depth(self.ideal.px_from_point(probe.uv.extend(1.0)));
-            outcome.linear_px = off(self.ideal.px_from_point(linear(probe.uv, w, twist, dt_s).extend(1.0)));
-            outcome.rk2_px = off(self.ideal.px_from_point(rk2(probe.uv, w, twist, dt_s, RK2_STEP_DEG.to_radians()).extend(1.0)));
-        }
+        let dt_s = t_s - self.key_s;
+        // The paper's models read the depth at the ray's own place.
+        let w = depth.inverse_depth(self.ideal.px_from_point(probe.uv.extend(1.0)));
+        let displaced = |stage: TemporalStage| {
+            let uv = stage.displaced(probe.uv, w, &self.twist, dt_s).unwrap_or(DVec2::NAN);
+            off(self.ideal.px_from_point(uv.extend(1.0)))
+        };
+        outcome.linear_px = displaced(TemporalStage::Linear);
+        outcome.rk2_px = displaced(TemporalStage::Rk2);
         outcome.level_of_detail_px = self.level_of_detail_px(truth_px, (direction, shift));
         if outcome.after[MAX_LOOK_UPS] > self.suspect_px {
             outcome.at_silhouette = self.is_hidden(in_key, w) || self.near_a_step(probe, &pose, met);

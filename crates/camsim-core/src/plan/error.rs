@@ -19,7 +19,7 @@ use crate::{
     scene::{LodSelection, select_lod},
     sequence::Sequence,
     shutter::Shutter,
-    temporal::IdealGeometry,
+    temporal::{IdealGeometry, displacement::Twist},
 };
 
 /// Times the largest error found.
@@ -72,6 +72,7 @@ pub(super) struct Case<'a> {
     pub key_s: f64,
     pub key_pose: &'a CameraPose,
     pub ideal: &'a IdealGeometry,
+    pub key_twist: Twist,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
 }
@@ -84,7 +85,7 @@ pub(super) struct Choice {
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
-pub(super) fn choose(case: &Case<'_>, motion: &Motion, edges: EdgeStage) -> Choice {
+pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &Motion, edges: EdgeStage) -> Choice {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let mut terrain_error_px = quality.max_terrain_error_px;
@@ -101,7 +102,7 @@ pub(super) fn choose(case: &Case<'_>, motion: &Motion, edges: EdgeStage) -> Choi
     let budget_px = tolerance_px - forecast.nodes_px(case.blur);
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
-    let temporal = forecast.choose(budget_px, may_skip_depth);
+    let temporal = demanded.unwrap_or_else(|| forecast.choose(budget_px, may_skip_depth));
     let predicted = forecast.predict(temporal, case.blur, tolerance_px);
     Choice { temporal, terrain_error_px, predicted }
 }
@@ -124,7 +125,7 @@ impl Case<'_> {
             key_pose: self.key_pose,
             ideal: self.ideal,
             lod,
-            twist: None,
+            twist: self.key_twist,
             suspect_px: SUSPECT_SHARE * self.sequence.scenario.quality.max_error_px,
         };
         Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial)
@@ -244,6 +245,8 @@ fn error_px(run: &Outcome, stage: TemporalStage) -> f64 {
     match stage {
         TemporalStage::Identity => run.still_px,
         TemporalStage::Rotation => run.after[0],
+        TemporalStage::Linear => run.linear_px,
+        TemporalStage::Rk2 => run.rk2_px,
         TemporalStage::Reproject { iterations } => run.after[(iterations as usize).min(MAX_LOOK_UPS)],
     }
 }
