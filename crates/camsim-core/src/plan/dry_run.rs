@@ -14,7 +14,7 @@ use crate::{
 
 /// Look-ups that are tried.
 pub(super) const MAX_LOOK_UPS: usize = 8;
-/// A step of depth to a neighbour, relative to the nearer, beyond what one surface has; and how far neighbours are.
+/// A second difference of inverse depth, relative to the nearest, beyond what one surface has; and how far neighbours are.
 const STEP: f64 = 0.02;
 const NEAR_PX: [f64; 2] = [1.5, 3.0];
 /// Relative difference of depth beyond which something else stands before a point.
@@ -34,8 +34,6 @@ pub(super) struct Trial<'a> {
     pub lod: &'a LodSelection,
     /// Motion of the camera at the key instant, for the paper's models.
     pub twist: Twist,
-    /// Errors beyond this are looked into: are they a silhouette's?
-    pub suspect_px: f64,
 }
 
 /// How far each way of solving looks from the truth, ideal pixels.
@@ -45,6 +43,8 @@ pub(super) struct Outcome {
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
     pub inverse_depth: f64,
+    /// The same of the key camera; 0 = sky.
+    pub key_inverse_depth: f64,
     /// One pose for all lines.
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
@@ -58,8 +58,6 @@ pub(super) struct Outcome {
     pub rk2_px: f64,
     /// Displacement by parallax.
     pub parallax_px: f64,
-    /// At a silhouette, or not seen from the key pose.
-    pub at_silhouette: bool,
 }
 
 /// Where a ray first meets something.
@@ -67,7 +65,6 @@ pub(super) struct Outcome {
 struct Met {
     /// Planar depth for a direction with z = 1 in its camera.
     depth_m: f64,
-    surface: usize,
     terrain: Option<TerrainHit>,
 }
 
@@ -96,6 +93,7 @@ impl Trial<'_> {
         let mut outcome = Outcome {
             at_px: truth_px,
             inverse_depth: w,
+            key_inverse_depth: w / in_key.z,
             still_px: off(self.ideal.px_from_point(probe.uv.extend(1.0))),
             parallax_px: off(rotated_px),
             ..Outcome::default()
@@ -115,9 +113,6 @@ impl Trial<'_> {
         outcome.linear_px = displaced(TemporalStage::Linear);
         outcome.rk2_px = displaced(TemporalStage::Rk2);
         outcome.level_of_detail_px = self.level_of_detail_px(truth_px, (direction, shift));
-        if outcome.after[MAX_LOOK_UPS] > self.suspect_px {
-            outcome.at_silhouette = self.is_hidden(in_key, w) || self.near_a_step(probe, &pose, met);
-        }
         Some(outcome)
     }
 
@@ -163,27 +158,30 @@ impl Trial<'_> {
         draws.binary_search_by_key(&chunk, |draw| draw.chunk).ok().map(|i| &draws[i])
     }
 
-    /// Whether the key camera sees something else before a point, given in its coordinates times `w`.
-    fn is_hidden(&self, in_key: DVec3, w: f64) -> bool {
-        let seen = meet(self.scene, self.key_pose.position_ned_m, self.key_pose.ned_from_camera * (in_key / in_key.z));
-        match seen {
-            Some(seen) => w == 0.0 || seen.depth_m < (1.0 - HIDDEN) * in_key.z / w,
-            None => false,
-        }
+    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it.
+    pub fn at_silhouette(&self, probe: &Probe, run: &Outcome) -> bool {
+        self.is_hidden(run) || self.near_a_step(probe)
     }
 
-    /// Whether the line's own camera sees a step of depth within a few pixels.
-    fn near_a_step(&self, probe: &Probe, pose: &CameraPose, here: Option<Met>) -> bool {
+    fn is_hidden(&self, run: &Outcome) -> bool {
+        let seen = meet(self.scene, self.key_pose.position_ned_m, self.key_ray(run.at_px));
+        seen.is_some_and(|seen| run.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
+    }
+
+    /// Inverse depth is linear over a plane: its second difference tells a step from a slope.
+    fn near_a_step(&self, probe: &Probe) -> bool {
+        let pose = self.path.pose(self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]));
         let look = |offset_px: DVec2| {
             let uv = probe.uv + probe.uv_from_px * offset_px;
-            meet(self.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0))
+            meet(self.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
         };
-        let steps = |there: Option<Met>| match (here, there) {
-            (Some(a), Some(b)) => a.surface != b.surface || (a.depth_m - b.depth_m).abs() > STEP * a.depth_m.min(b.depth_m),
-            (None, None) => false,
-            _ => true,
-        };
-        NEAR_PX.iter().any(|&px| (-1..=1).any(|y| (-1..=1).any(|x| steps(look(px * DVec2::new(f64::from(x), f64::from(y)))))))
+        let here = look(DVec2::ZERO);
+        NEAR_PX.iter().any(|&px| {
+            [DVec2::X, DVec2::Y, DVec2::ONE, DVec2::new(1.0, -1.0)].into_iter().any(|along| {
+                let (before, after) = (look(-px * along), look(px * along));
+                (before - 2.0 * here + after).abs() > STEP * before.max(here).max(after)
+            })
+        })
     }
 }
 
@@ -250,11 +248,11 @@ fn meet(scene: &Scene, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met>
         .terrain
         .as_ref()
         .and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY))
-        .map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) });
-    for (i, mesh) in scene.meshes.iter().enumerate() {
+        .map(|hit| Met { depth_m: hit.t, terrain: Some(hit) });
+    for mesh in &scene.meshes {
         let limit = first.map_or(f64::INFINITY, |met| met.depth_m);
         if let Some((t, _)) = mesh.intersect(origin_ned_m, direction_ned, limit) {
-            first = Some(Met { depth_m: t, surface: 1 + i, terrain: None });
+            first = Some(Met { depth_m: t, terrain: None });
         }
     }
     first

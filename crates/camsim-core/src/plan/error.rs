@@ -4,6 +4,8 @@
 //! rays (`dry_run.rs`), and what single precision adds comes from the sizes of the numbers (`rounding.rs`). The largest error of n probes
 //! is above the 99th percentile of all pixels with a probability of `1 - 0.99^n` (98.7 % of 432); what it misses is what [`SAFETY`] is for.
 
+use std::cell::Cell;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -28,8 +30,6 @@ const SAFETY: f64 = 1.25;
 const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
 const BOUND_SHARE: f64 = 0.5;
-/// Errors beyond this part of the tolerance are asked whether they are a silhouette's.
-const SUSPECT_SHARE: f64 = 0.1;
 /// Probes whose exposure is looked at.
 const CHORD_PROBES: usize = 32;
 /// Stretches of path looked at for each of them.
@@ -53,7 +53,7 @@ pub struct Predicted {
     pub format_px: f64,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the probes that were set apart: near a silhouette or not seen from the key pose, and off by more than the tolerance allows.
+    /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose.
     pub silhouette_share: f64,
     /// Probes with a source.
     pub probes: u32,
@@ -126,7 +126,6 @@ impl Case<'_> {
             ideal: self.ideal,
             lod,
             twist: self.key_twist,
-            suspect_px: SUSPECT_SHARE * self.sequence.scenario.quality.max_error_px,
         };
         Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial)
     }
@@ -137,29 +136,44 @@ pub(super) struct Forecast<'a> {
     camera: &'a CameraModel,
     ray: RayStage,
     trial: Trial<'a>,
-    runs: Vec<(Probe, Outcome)>,
-    apart: usize,
+    runs: Vec<Run>,
+}
+
+/// One probe.
+struct Run {
+    probe: Probe,
+    outcome: Outcome,
+    /// Whether it is to be counted apart; unknown until it matters.
+    apart: Cell<Option<bool>>,
 }
 
 impl<'a> Forecast<'a> {
     pub fn new(probes: &[Probe], camera: &'a CameraModel, ray: RayStage, trial: Trial<'a>) -> Self {
-        let all: Vec<(Probe, Outcome)> =
-            probes.par_iter().with_min_len(16).filter_map(|probe| trial.run(probe).map(|run| (*probe, run))).collect();
-        let found = all.len();
-        let runs: Vec<_> = all.into_iter().filter(|(_, run)| !run.at_silhouette).collect();
-        let apart = found - runs.len();
-        Self { camera, ray, trial, runs, apart }
+        let run = |probe: &Probe| trial.run(probe).map(|outcome| Run { probe: *probe, outcome, apart: Cell::new(None) });
+        let runs = probes.par_iter().with_min_len(16).filter_map(run).collect();
+        Self { camera, ray, trial, runs }
+    }
+
+    /// The largest of a figure over the runs that are not to be counted apart. Only the largest are asked whether they are.
+    fn largest(&self, of: impl Fn(&Run) -> f64) -> f64 {
+        let mut order: Vec<(f64, &Run)> = self.runs.iter().filter(|run| run.apart.get() != Some(true)).map(|run| (of(run), run)).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let counted = |run: &Run| {
+            let apart = run.apart.get().unwrap_or_else(|| self.trial.at_silhouette(&run.probe, &run.outcome));
+            run.apart.set(Some(apart));
+            !apart
+        };
+        order.into_iter().find(|(px, run)| *px == 0.0 || counted(run)).map_or(0.0, |(px, _)| px)
     }
 
     /// Largest displacement of a source by the level of detail.
     pub fn level_of_detail_px(&self) -> f64 {
-        self.largest(|run| run.level_of_detail_px)
+        self.largest(|run| run.outcome.level_of_detail_px)
     }
 
     /// Without the chords of the exposure.
     pub fn total_px(&self, stage: TemporalStage) -> f64 {
-        let all = self.runs.iter().map(|(probe, run)| SAFETY * error_px(run, stage) + self.rounding(probe, run, stage).total_px());
-        all.fold(0.0, f64::max)
+        self.largest(|run| SAFETY * error_px(&run.outcome, stage) + self.rounding(run, stage).total_px())
     }
 
     /// The cheapest stage within `budget_px`, or the best there is.
@@ -184,11 +198,11 @@ impl<'a> Forecast<'a> {
     pub fn predict(&self, stage: TemporalStage, blur: Option<BlurStage>, max_error_px: f64) -> Predicted {
         let nodes_px = self.nodes_px(blur);
         let total_px = self.total_px(stage) + nodes_px;
-        let lens_px = self.largest_of(|probe, run| self.rounding(probe, run, stage).lens_px);
-        let format_px = self.largest_of(|probe, run| self.rounding(probe, run, stage).format_px);
-        let temporal_px = SAFETY * self.largest(|run| unsettled_px(run, stage));
+        let lens_px = self.largest(|run| self.rounding(run, stage).lens_px);
+        let format_px = self.largest(|run| self.rounding(run, stage).format_px);
+        let temporal_px = SAFETY * self.largest(|run| unsettled_px(&run.outcome, stage));
         let depth_px = match stage {
-            TemporalStage::Reproject { .. } => SAFETY * self.largest(|run| run.after[MAX_LOOK_UPS]),
+            TemporalStage::Reproject { .. } => SAFETY * self.largest(|run| run.outcome.after[MAX_LOOK_UPS]),
             _ => 0.0,
         };
         let kept = total_px <= max_error_px;
@@ -197,10 +211,11 @@ impl<'a> Forecast<'a> {
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
             (depth_px, "depth between the pixels of the ideal frame"),
-            (nodes_px, "the exposure nodes, of which there are no more"),
+            (nodes_px, "the straight stretches between the exposure's nodes"),
         ];
         let largest = causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| !kept);
-        let probes = (self.runs.len() + self.apart) as u32;
+        let probes = self.runs.len() as u32;
+        let apart = self.runs.iter().filter(|run| run.apart.get() == Some(true)).count();
         Predicted {
             lens_px,
             temporal_px,
@@ -209,23 +224,15 @@ impl<'a> Forecast<'a> {
             nodes_px,
             format_px,
             total_px,
-            silhouette_share: self.apart as f64 / f64::from(probes.max(1)),
+            silhouette_share: apart as f64 / f64::from(probes.max(1)),
             probes,
             kept,
             in_the_way: largest.map(|(px, what)| format!("{what}: {px:.2e} px")),
         }
     }
 
-    fn rounding(&self, probe: &Probe, run: &Outcome, stage: TemporalStage) -> Rounding {
-        Rounding::new(probe, run.at_px, run.parallax_px, self.camera, self.trial.ideal, self.ray, stage)
-    }
-
-    fn largest(&self, of: impl Fn(&Outcome) -> f64) -> f64 {
-        self.runs.iter().map(|(_, run)| of(run)).fold(0.0, f64::max)
-    }
-
-    fn largest_of(&self, of: impl Fn(&Probe, &Outcome) -> f64) -> f64 {
-        self.runs.iter().map(|(probe, run)| of(probe, run)).fold(0.0, f64::max)
+    fn rounding(&self, run: &Run, stage: TemporalStage) -> Rounding {
+        Rounding::new(&run.probe, run.outcome.at_px, run.outcome.parallax_px, self.camera, self.trial.ideal, self.ray, stage)
     }
 
     /// Largest miss of the straight stretches between the exposure's nodes.
@@ -233,8 +240,8 @@ impl<'a> Forecast<'a> {
         let Some(segments) = blur.map(|blur| blur.nodes - 1) else { return 0.0 };
         let looked_at = CHORD_SEGMENTS.min(segments);
         let every = self.runs.len().div_ceil(CHORD_PROBES).max(1);
-        let miss = |(probe, run): &(Probe, Outcome)| {
-            (0..looked_at).map(|k| self.trial.chord_px(probe, run, k * segments / looked_at, segments)).fold(0.0, f64::max)
+        let miss = |run: &Run| {
+            (0..looked_at).map(|k| self.trial.chord_px(&run.probe, &run.outcome, k * segments / looked_at, segments)).fold(0.0, f64::max)
         };
         SAFETY * self.runs.iter().step_by(every).map(miss).fold(0.0, f64::max)
     }
