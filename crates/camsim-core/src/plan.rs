@@ -26,6 +26,8 @@ mod dry_run;
 mod edges;
 mod error;
 mod forced;
+mod grain;
+mod levels;
 mod lines;
 mod motion;
 mod probes;
@@ -204,6 +206,7 @@ pub struct Planner {
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
     outline: edges::SceneOutline,
+    grain: grain::SceneGrain,
     truth: bool,
     max_side_px: u32,
 }
@@ -223,7 +226,8 @@ impl Planner {
         };
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let outline = edges::SceneOutline::new(&sequence.scene);
-        Ok(Self { sequence, shutter, zoom, fixed, outline, truth, max_side_px })
+        let grain = grain::SceneGrain::new(&sequence.scene);
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, truth, max_side_px })
     }
 
     /// The sequence.
@@ -271,10 +275,8 @@ impl Planner {
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
         let key_pose = path.pose(key_s);
-        let key_twist = Twist {
-            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
-            rate_rad_s: path.rate_camera(key_s),
-        };
+        let key_twist =
+            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
         let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene, demanded.map(|stage| (stage, key_twist)));
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
@@ -288,7 +290,21 @@ impl Planner {
         let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, quality, &motion));
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
-        let case = error::Case { reach: &reach, sequence: &self.sequence, shutter: &self.shutter, stamp_s, key_s, key_pose: &key_pose, ideal: &ideal, key_twist, ray, blur };
+        let max_taps = quality.footprint_taps.value().unwrap_or(4).max(1);
+        let case = error::Case {
+            reach: &reach,
+            sequence: &self.sequence,
+            shutter: &self.shutter,
+            stamp_s,
+            key_s,
+            key_pose: &key_pose,
+            ideal: &ideal,
+            key_twist,
+            ray,
+            blur,
+            max_taps,
+            grain: &self.grain,
+        };
         let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         motion::note_skips(&motion, temporal, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
@@ -308,7 +324,7 @@ impl Planner {
             temporal,
             blur,
             edges,
-            max_taps: quality.footprint_taps.value().unwrap_or(4).max(1),
+            max_taps,
             truth: self.truth,
             motion,
             terrain_error_px,

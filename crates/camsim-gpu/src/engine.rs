@@ -353,8 +353,12 @@ impl Session<'_> {
 
     /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
     fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal && drawn.edges == plan.edges
-            && drawn.terrain_error_px == plan.terrain_error_px) {
+        if self.drawn.as_ref().is_some_and(|drawn| {
+            drawn.pose == plan.key_pose
+                && drawn.ideal == plan.ideal
+                && drawn.edges == plan.edges
+                && drawn.terrain_error_px == plan.terrain_error_px
+        }) {
             return;
         }
         let gpu = &self.engine.gpu;
@@ -382,14 +386,8 @@ impl Session<'_> {
             plan.terrain_error_px,
             &self.targets[target],
         );
-        self.drawn = Some(Drawn {
-            pose: plan.key_pose,
-            ideal: plan.ideal,
-            edges: plan.edges,
-            terrain_error_px: plan.terrain_error_px,
-            target,
-            lod,
-        });
+        self.drawn =
+            Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
     }
 
     /// Pass 3: the output frame.

@@ -122,16 +122,26 @@ fn frame(dice: &mut Dice, over_m: [f64; 2]) -> (Scenario, Trajectory) {
 }
 
 /// Worst over mid-exposure and, where there is an exposure, three more of its phases.
-fn measured(engine: &camsim_gpu::Engine, sequence: &Arc<camsim_core::sequence::Sequence>, oracle: &Oracle) -> (ErrorStats, camsim_core::plan::FramePlan) {
+fn measured(
+    engine: &camsim_gpu::Engine,
+    sequence: &Arc<camsim_core::sequence::Sequence>,
+    oracle: &Oracle,
+) -> (ErrorStats, camsim_core::plan::FramePlan) {
     let mut worst = ErrorStats::default();
     let mut phases = vec![0.0];
     let mut plan = None;
     while let Some(phase) = phases.pop() {
         let done = render_at_phase(engine, sequence, &[Channel::Coords], 0, phase);
-        if plan.is_none() && let Some(blur) = done.plan.blur {
+        if plan.is_none()
+            && let Some(blur) = done.plan.blur
+        {
             // Begin, and the middles of two stretches.
             let segments = blur.nodes as f32 - 1.0;
-            phases.extend([-0.5, ((0.25 * segments).floor() + 0.5) / segments - 0.5, ((0.75 * segments).floor() + 0.5) / segments - 0.5 + 1e-4]);
+            phases.extend([
+                -0.5,
+                ((0.25 * segments).floor() + 0.5) / segments - 0.5,
+                ((0.75 * segments).floor() + 0.5) / segments - 0.5 + 1e-4,
+            ]);
         }
         let errors = coord_errors(oracle, &done.plan, &done.frame, f64::from(phase), 1).expect("coords were asked for").smooth;
         if errors.p99_px >= worst.p99_px {
@@ -147,10 +157,14 @@ fn measured(engine: &camsim_gpu::Engine, sequence: &Arc<camsim_core::sequence::S
 fn random_frames_stay_within_their_prediction() {
     let long = std::env::var_os("CAMSIM_LONG").is_some_and(|value| value == "1");
     let engine = engine();
-    let scenes = [("plane", pattern(60_000.0), [40.0, 800.0]), ("hills", hills(), [150.0, 700.0]), ("buildings", buildings(), [60.0, 250.0])];
+    let scenes =
+        [("plane", pattern(60_000.0), [40.0, 800.0]), ("hills", hills(), [150.0, 700.0]), ("buildings", buildings(), [60.0, 250.0])];
     let mut ratios = Vec::new();
     let mut broken = Vec::new();
-    println!("{:>5} {:9} {:>6} {:22} {:>8} {:>9} {:>9} {:>9} {:>9} {:>6}", "frame", "scene", "tol", "temporal", "pixels", "rms", "p99", "max", "predicted", "ratio");
+    println!(
+        "{:>5} {:9} {:>6} {:22} {:>8} {:>9} {:>9} {:>9} {:>9} {:>6}",
+        "frame", "scene", "tol", "temporal", "pixels", "rms", "p99", "max", "predicted", "ratio"
+    );
     for seed in (0..FRAMES).step_by(if long { 1 } else { 5 }) {
         let (name, scene, over_m) = &scenes[(seed / 5 % 3) as usize];
         let mut dice = Dice { seed, thrown: 0 };

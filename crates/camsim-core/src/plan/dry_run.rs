@@ -45,6 +45,8 @@ pub(super) struct Outcome {
     pub inverse_depth: f64,
     /// The same of the key camera; 0 = sky.
     pub key_inverse_depth: f64,
+    /// What is seen: 0 = terrain, 1 + i = mesh i, `None` = sky.
+    pub surface: Option<usize>,
     /// One pose for all lines.
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
@@ -65,6 +67,7 @@ pub(super) struct Outcome {
 struct Met {
     /// Planar depth for a direction with z = 1 in its camera.
     depth_m: f64,
+    surface: usize,
     terrain: Option<TerrainHit>,
 }
 
@@ -94,6 +97,7 @@ impl Trial<'_> {
             at_px: truth_px,
             inverse_depth: w,
             key_inverse_depth: w / in_key.z,
+            surface: met.map(|met| met.surface),
             still_px: off(self.ideal.px_from_point(probe.uv.extend(1.0))),
             parallax_px: off(rotated_px),
             ..Outcome::default()
@@ -116,15 +120,16 @@ impl Trial<'_> {
         Some(outcome)
     }
 
-    /// How far the middle of stretch `k` of the path over the exposure is from the middle of its chord, for a surface of the probe's depth.
-    pub fn chord_px(&self, probe: &Probe, run: &Outcome, k: u32, segments: u32) -> f64 {
+    /// Source at a share of the exposure, 0 to 1, for a surface of the probe's depth.
+    pub fn source_px(&self, probe: &Probe, run: &Outcome, share: f64) -> DVec2 {
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
-        let place = |along: f64| {
-            let t_s = mid_s + self.shutter.exposure_s() * (along / f64::from(segments) - 0.5);
-            let (rotation, shift) = self.path.pose(t_s).relative_to(self.key_pose);
-            self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + run.inverse_depth * shift)
-        };
-        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|share| place(f64::from(k) + share));
+        let (rotation, shift) = self.path.pose(mid_s + self.shutter.exposure_s() * (share - 0.5)).relative_to(self.key_pose);
+        self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + run.inverse_depth * shift)
+    }
+
+    /// How far the middle of stretch `k` of the path over the exposure is from the middle of its chord.
+    pub fn chord_px(&self, probe: &Probe, run: &Outcome, k: u32, segments: u32) -> f64 {
+        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|half| self.source_px(probe, run, (f64::from(k) + half) / f64::from(segments)));
         let miss_px = middle.distance(0.5 * (begin + end));
         if miss_px.is_finite() { miss_px } else { 0.0 }
     }
@@ -186,12 +191,7 @@ impl Trial<'_> {
 }
 
 /// The places looked at: after no look-up, after one and so on. The same steps as [`crate::temporal::reproject`].
-fn settle(
-    uv: DVec2,
-    (rotation, shift): (DMat3, DVec3),
-    ideal: &IdealGeometry,
-    depth: &mut KeyDepth<'_>,
-) -> [DVec2; MAX_LOOK_UPS + 1] {
+fn settle(uv: DVec2, (rotation, shift): (DMat3, DVec3), ideal: &IdealGeometry, depth: &mut KeyDepth<'_>) -> [DVec2; MAX_LOOK_UPS + 1] {
     let direction = rotation * uv.extend(1.0);
     let mut w = 0.0;
     let mut at_px = ideal.px_from_point(direction);
@@ -248,11 +248,11 @@ fn meet(scene: &Scene, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met>
         .terrain
         .as_ref()
         .and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY))
-        .map(|hit| Met { depth_m: hit.t, terrain: Some(hit) });
-    for mesh in &scene.meshes {
+        .map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) });
+    for (i, mesh) in scene.meshes.iter().enumerate() {
         let limit = first.map_or(f64::INFINITY, |met| met.depth_m);
         if let Some((t, _)) = mesh.intersect(origin_ned_m, direction_ned, limit) {
-            first = Some(Met { depth_m: t, terrain: None });
+            first = Some(Met { depth_m: t, surface: 1 + i, terrain: None });
         }
     }
     first

@@ -12,6 +12,8 @@ use serde::Serialize;
 use super::{
     BlurStage, EdgeStage, LensReach, Motion, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial},
+    grain::SceneGrain,
+    levels::Levels,
     probes::Probe,
     rounding::Rounding,
 };
@@ -51,6 +53,10 @@ pub struct Predicted {
     pub nodes_px: f64,
     /// Single precision of poses, depth and coordinates.
     pub format_px: f64,
+    /// Resampling: an estimate of its RMS over the picture, 1/255 of the linear range.
+    pub resampling_dn: f64,
+    /// The same of too few samples over the exposure.
+    pub blur_dn: f64,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
     /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose.
@@ -75,6 +81,8 @@ pub(super) struct Case<'a> {
     pub key_twist: Twist,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
+    pub max_taps: u32,
+    pub grain: &'a SceneGrain,
 }
 
 /// What was chosen, and what it leads to.
@@ -103,7 +111,7 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let temporal = demanded.unwrap_or_else(|| forecast.choose(budget_px, may_skip_depth));
-    let predicted = forecast.predict(temporal, case.blur, tolerance_px);
+    let predicted = forecast.predict(case, temporal);
     Choice { temporal, terrain_error_px, predicted }
 }
 
@@ -195,9 +203,11 @@ impl<'a> Forecast<'a> {
     }
 
     /// The errors of a stage by cause.
-    pub fn predict(&self, stage: TemporalStage, blur: Option<BlurStage>, max_error_px: f64) -> Predicted {
+    pub fn predict(&self, case: &Case<'_>, stage: TemporalStage) -> Predicted {
+        let (blur, max_error_px) = (case.blur, case.sequence.scenario.quality.max_error_px);
         let nodes_px = self.nodes_px(blur);
         let total_px = self.total_px(stage) + nodes_px;
+        let [resampling_dn, blur_dn] = self.levels_dn(case);
         let lens_px = self.largest(|run| self.rounding(run, stage).lens_px);
         let format_px = self.largest(|run| self.rounding(run, stage).format_px);
         let temporal_px = SAFETY * self.largest(|run| unsettled_px(&run.outcome, stage));
@@ -223,12 +233,27 @@ impl<'a> Forecast<'a> {
             level_of_detail_px: self.level_of_detail_px(),
             nodes_px,
             format_px,
+            resampling_dn,
+            blur_dn,
             total_px,
             silhouette_share: apart as f64 / f64::from(probes.max(1)),
             probes,
             kept,
             in_the_way: largest.map(|(px, what)| format!("{what}: {px:.2e} px")),
         }
+    }
+
+    /// Estimates of what resampling and blur samples cost.
+    fn levels_dn(&self, case: &Case<'_>) -> [f64; 2] {
+        let (mut sums, mut count) = ([0.0; 2], 0.0);
+        for Run { probe, outcome, .. } in &self.runs {
+            let ends_px =
+                [0.0, 1.0].map(|share| if case.blur.is_some() { self.trial.source_px(probe, outcome, share) } else { outcome.at_px });
+            let levels = Levels::new(probe, outcome, ends_px, self.trial.ideal, case.grain, case.max_taps, case.blur);
+            sums = [sums[0] + levels.resampling, sums[1] + levels.blur];
+            count += 1.0;
+        }
+        sums.map(|sum| 255.0 * (sum / f64::max(count, 1.0)).sqrt())
     }
 
     fn rounding(&self, run: &Run, stage: TemporalStage) -> Rounding {

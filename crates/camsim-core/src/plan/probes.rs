@@ -29,9 +29,8 @@ pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
     let inside = (0..rows).flat_map(|j| {
         (0..columns).map(move |i| {
             let k = f64::from(j * columns + i) + 0.5;
-            let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])].map(|(cell, cells, side, spread)| {
-                ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32
-            });
+            let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])]
+                .map(|(cell, cells, side, spread)| ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32);
             [x.min(width - 1), y.min(height - 1)]
         })
     });

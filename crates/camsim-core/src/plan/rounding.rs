@@ -1,10 +1,7 @@
 //! What single precision adds to a source coordinate, from the sizes of the numbers that are rounded.
 
 use super::{RayStage, TemporalStage, probes::Probe};
-use crate::{
-    camera::CameraModel,
-    temporal::IdealGeometry,
-};
+use crate::{camera::CameraModel, temporal::IdealGeometry};
 use glam::{DMat2, DVec2};
 
 /// Half a unit in the last place of a number of size 1: a rounding moves it by at most twice this, and by about this in the mean square.
