@@ -286,7 +286,7 @@ impl Planner {
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = ray_stage(&reach, &mut skipped);
-        let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+        let blur = motion::blur_stage(&motion, quality, &reach, path, &self.shutter, stamp_s, &ideal, &mut skipped);
         let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, quality, &motion));
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);

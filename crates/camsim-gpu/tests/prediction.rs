@@ -189,12 +189,10 @@ fn random_frames_stay_within_their_prediction() {
             if plan.blur.is_some() { "blur " } else { "" },
             predicted.in_the_way.as_deref().unwrap_or(""),
         );
-        println!("      {:?} {:?}", predicted, plan.motion.parallax_px);
-        if errors.p99_px > predicted.total_px {
+        let tolerance_px = sequence.scenario.quality.max_error_px;
+        if errors.p99_px > predicted.total_px || (predicted.kept && errors.p99_px > tolerance_px) {
+            println!("      {predicted:?} {:?} {:?}", plan.blur, plan.motion);
             broken.push(seed);
-        }
-        if predicted.kept {
-            assert!(errors.p99_px <= sequence.scenario.quality.max_error_px, "frame {seed} breaks the tolerance it is said to keep");
         }
         ratios.push(ratio);
     }

@@ -39,6 +39,8 @@ pub(super) struct Trial<'a> {
 /// How far each way of solving looks from the truth, ideal pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Outcome {
+    /// Instant, path time.
+    pub t_s: f64,
     /// True source.
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
@@ -78,9 +80,9 @@ struct KeyDepth<'a> {
 }
 
 impl Trial<'_> {
-    /// Runs one probe; `None` where its ray has no source in the ideal frame.
-    pub fn run(&self, probe: &Probe) -> Option<Outcome> {
-        let t_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
+    /// Runs one probe at an instant of its exposure (-0.5 to 0.5); `None` where its ray has no source in the ideal frame.
+    pub fn run(&self, probe: &Probe, phase: f64) -> Option<Outcome> {
+        let t_s = self.instant_s(probe, phase + 0.5);
         let pose = self.path.pose(t_s);
         let (rotation, shift) = pose.relative_to(self.key_pose);
         let direction = rotation * probe.uv.extend(1.0);
@@ -94,6 +96,7 @@ impl Trial<'_> {
         let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth_px) } else { f64::INFINITY };
         let rotated_px = self.ideal.px_from_point(direction);
         let mut outcome = Outcome {
+            t_s,
             at_px: truth_px,
             inverse_depth: w,
             key_inverse_depth: w / in_key.z,
@@ -120,10 +123,15 @@ impl Trial<'_> {
         Some(outcome)
     }
 
+    /// Instant at a share of the exposure, 0 to 1.
+    fn instant_s(&self, probe: &Probe, share: f64) -> f64 {
+        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
+        mid_s + self.shutter.exposure_s() * (share - 0.5)
+    }
+
     /// Source at a share of the exposure, 0 to 1, for a surface of the probe's depth.
     pub fn source_px(&self, probe: &Probe, run: &Outcome, share: f64) -> DVec2 {
-        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
-        let (rotation, shift) = self.path.pose(mid_s + self.shutter.exposure_s() * (share - 0.5)).relative_to(self.key_pose);
+        let (rotation, shift) = self.path.pose(self.instant_s(probe, share)).relative_to(self.key_pose);
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + run.inverse_depth * shift)
     }
 
@@ -165,7 +173,7 @@ impl Trial<'_> {
 
     /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it.
     pub fn at_silhouette(&self, probe: &Probe, run: &Outcome) -> bool {
-        self.is_hidden(run) || self.near_a_step(probe)
+        self.is_hidden(run) || self.near_a_step(probe, run)
     }
 
     fn is_hidden(&self, run: &Outcome) -> bool {
@@ -174,8 +182,8 @@ impl Trial<'_> {
     }
 
     /// Inverse depth is linear over a plane: its second difference tells a step from a slope.
-    fn near_a_step(&self, probe: &Probe) -> bool {
-        let pose = self.path.pose(self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]));
+    fn near_a_step(&self, probe: &Probe, run: &Outcome) -> bool {
+        let pose = self.path.pose(run.t_s);
         let look = |offset_px: DVec2| {
             let uv = probe.uv + probe.uv_from_px * offset_px;
             meet(self.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)

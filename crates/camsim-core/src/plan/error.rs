@@ -135,7 +135,7 @@ impl Case<'_> {
             lod,
             twist: self.key_twist,
         };
-        Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial)
+        Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial, self.blur.is_some())
     }
 }
 
@@ -156,9 +156,13 @@ struct Run {
 }
 
 impl<'a> Forecast<'a> {
-    pub fn new(probes: &[Probe], camera: &'a CameraModel, ray: RayStage, trial: Trial<'a>) -> Self {
-        let run = |probe: &Probe| trial.run(probe).map(|outcome| Run { probe: *probe, outcome, apart: Cell::new(None) });
-        let runs = probes.par_iter().with_min_len(16).filter_map(run).collect();
+    /// With an exposure that shows, the probes take turns in trying its middle and both its ends.
+    pub fn new(probes: &[Probe], camera: &'a CameraModel, ray: RayStage, trial: Trial<'a>, exposed: bool) -> Self {
+        let phases: &[f64] = if exposed { &[0.0, -0.5, 0.5] } else { &[0.0] };
+        let run = |(i, probe): (usize, &Probe)| {
+            trial.run(probe, phases[i % phases.len()]).map(|outcome| Run { probe: *probe, outcome, apart: Cell::new(None) })
+        };
+        let runs = probes.par_iter().enumerate().with_min_len(16).filter_map(run).collect();
         Self { camera, ray, trial, runs }
     }
 
