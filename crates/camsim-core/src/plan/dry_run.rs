@@ -34,6 +34,8 @@ pub(super) struct Trial<'a> {
     pub lod: &'a LodSelection,
     /// Motion of the camera at the key instant, for the paper's models.
     pub twist: Twist,
+    /// Whether these read the nearest texel's depth.
+    pub nearest_depth: bool,
 }
 
 /// How far each way of solving looks from the truth, ideal pixels.
@@ -112,7 +114,8 @@ impl Trial<'_> {
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
         let dt_s = t_s - self.key_s;
         // The paper's models read the depth at the ray's own place.
-        let w = depth.inverse_depth(self.ideal.px_from_point(probe.uv.extend(1.0)));
+        let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
+        let w = depth.inverse_depth(if self.nearest_depth { own_px.round() } else { own_px });
         let displaced = |stage: TemporalStage| {
             let uv = stage.displaced(probe.uv, w, &self.twist, dt_s).unwrap_or(DVec2::NAN);
             off(self.ideal.px_from_point(uv.extend(1.0)))

@@ -20,6 +20,7 @@ use super::{
 use crate::{
     camera::CameraModel,
     pose::CameraPose,
+    scenario::Preset,
     scene::{LodSelection, select_lod},
     sequence::Sequence,
     shutter::Shutter,
@@ -134,6 +135,7 @@ impl Case<'_> {
             ideal: self.ideal,
             lod,
             twist: self.key_twist,
+            nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
         };
         Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial, self.blur.is_some())
     }
@@ -221,7 +223,7 @@ impl<'a> Forecast<'a> {
         };
         let kept = total_px <= max_error_px;
         let causes = [
-            (lens_px, "single precision of the lens map"),
+            (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
             (depth_px, "depth between the pixels of the ideal frame"),

@@ -16,6 +16,9 @@ const ROTATION_ROUNDINGS: f64 = 2.8;
 /// Relative roundings of an inverse depth: rasterised, blended, and solved for.
 const DEPTH_ROUNDINGS: f64 = 8.0;
 
+/// Where the paper's Gauss-Newton inverse stops, output pixels.
+const GAUSS_NEWTON_STOP_PX: f64 = 0.1;
+
 /// 99th percentiles of what rounding adds at a probe, ideal pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rounding {
@@ -37,12 +40,15 @@ impl Rounding {
         temporal: TemporalStage,
     ) -> Self {
         let focal_px = ideal.focal_px.max_element();
+        let stretch = || largest_stretch(DMat2::from_diagonal(ideal.focal_px) * probe.uv_from_px);
         let lens_px = match ray {
-            RayStage::Pinhole => UNIT * probe.uv.length() * focal_px,
+            RayStage::Pinhole => P99 * UNIT * probe.uv.length() * focal_px,
             RayStage::LensMap => {
                 let residual_px = UNIT * LENS_ROUNDINGS * probe.distorted.length().max(0.1) * camera.focal_px.max_element();
-                residual_px * largest_stretch(DMat2::from_diagonal(ideal.focal_px) * probe.uv_from_px)
+                P99 * residual_px * stretch()
             }
+            // Not rounding: it stops there. Roots that are false are beyond any prediction.
+            RayStage::GaussNewton => GAUSS_NEWTON_STOP_PX * stretch(),
         };
         let from_centre = at_px - ideal.principal_px;
         // x / z and f x / z, and the sum.
@@ -54,7 +60,7 @@ impl Rounding {
         };
         let depth_px = DEPTH_ROUNDINGS * parallax_px;
         let format_px = UNIT * (place_px * place_px + turned_px * turned_px + depth_px * depth_px).sqrt();
-        Self { lens_px: P99 * lens_px, format_px: P99 * format_px }
+        Self { lens_px, format_px: P99 * format_px }
     }
 
     /// Both together: they are independent.
