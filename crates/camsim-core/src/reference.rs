@@ -31,7 +31,7 @@ mod tests;
 use clock::Clock;
 use eye::Eye;
 use ground::Ground;
-pub use measure::{CoordErrors, ErrorStats, ImageErrors, coord_errors, image_errors, silhouettes};
+pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, coord_errors, image_errors, silhouettes};
 use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;

@@ -6,8 +6,8 @@
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
 use camsim_core::{
-    camera::CameraError,
     mount::MountError,
+    reference::OracleError,
     scenario::{Preset, validate},
     sequence::Sequence,
 };
@@ -56,9 +56,9 @@ pub enum BenchError {
     /// The device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The oracle's camera.
+    /// The oracle's camera or shutter.
     #[error(transparent)]
-    Camera(#[from] CameraError),
+    Oracle(#[from] OracleError),
     /// The plot.
     #[error(transparent)]
     Plot(#[from] PlotError),
