@@ -1,5 +1,6 @@
 //! One file a command: its arguments, its help, and `run`.
 
+pub mod bench;
 pub mod camera;
 pub mod compare;
 pub mod completions;

@@ -29,11 +29,11 @@ fn help_names_every_command_and_every_exit_code() {
     let (code, out, err) = camsim(["--help"]);
     assert_eq!((code, err.as_str()), (0, ""));
     for word in
-        ["demo", "render", "explain", "track", "lens", "camera", "compare", "info", "viewer", "completions", "Exit codes", "CAMSIM_ADAPTER"]
+        ["demo", "render", "explain", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions", "Exit codes", "CAMSIM_ADAPTER"]
     {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
-    for command in ["demo", "render", "explain", "track", "lens", "camera", "compare", "info", "viewer", "completions"] {
+    for command in ["demo", "render", "explain", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions"] {
         let (code, out, _) = camsim([command, "--help"]);
         assert_eq!(code, 0, "{command}");
         assert!(out.contains("Usage: camsim"), "{out}");

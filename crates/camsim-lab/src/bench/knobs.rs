@@ -118,9 +118,7 @@ pub fn resize(scenario: &mut Scenario, size_px: [u32; 2]) {
     let scale = f64::from(size_px[1]) / f64::from(camera.size_px[1]);
     let middle = camera.size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
     if let Some(principal) = &mut camera.principal_point_px {
-        for k in 0..2 {
-            principal[k] = 0.5 * (f64::from(size_px[k]) - 1.0) + scale * (principal[k] - middle[k]);
-        }
+        *principal = [0, 1].map(|k: usize| 0.5 * (f64::from(size_px[k]) - 1.0) + scale * (principal[k] - middle[k]));
     }
     camera.focal_px = camera.focal_px.map(|focal| scale * focal);
     camera.size_px = size_px;

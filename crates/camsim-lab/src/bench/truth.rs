@@ -1,8 +1,8 @@
 //! The error of a row against the oracle, on one frame of the case.
 //!
 //! Coordinates are compared at every pixel. Pictures are compared at a part of the pixels, each of them converged: the oracle takes tens to
-//! hundreds of rays a pixel. The part is even over the picture, and even over the neighbourhood of silhouettes, which is drawn more densely; the
-//! overall figure weighs both as they are in the whole picture.
+//! hundreds of rays a pixel. The part is random over the picture, and random over the neighbourhood of silhouettes, where it is denser; the overall
+//! figure weighs both as they are in the whole picture.
 
 use std::{convert::Infallible, sync::Arc};
 
@@ -16,11 +16,14 @@ use camsim_core::{
 use camsim_gpu::{Engine, engine::Finished};
 
 use super::BenchError;
+use crate::cases::world::hash;
 
 /// The frame that is compared.
 const FRAME: u64 = 1;
 /// Pixels of the picture that are compared, about: away from silhouettes, and within 3 px of them.
-const PICTURED: [usize; 2] = [4000, 2000];
+const PICTURED: [u64; 2] = [4000, 2000];
+/// Seed of their choice.
+const SEED: u64 = 77;
 /// The oracle's pixels are refined to this standard error, 1/255: 62 dB, well above any row.
 const TOLERANCE_DN: f64 = 0.2;
 /// Rays of a pixel at most.
@@ -61,7 +64,7 @@ impl Truth {
         let oracle = Arc::new(Oracle::new(sequence.clone())?);
         let coords = CoordTruth::new(oracle.clone(), FRAME, 0.0);
         let near = coords.near_silhouettes();
-        let valid = coords.valid();
+        let valid: Vec<bool> = coords.valid().collect();
         let whole = [false, true].map(|kind| near.iter().zip(&valid).filter(|(near, valid)| **valid && **near == kind).count() as u64);
         let only = chosen(near, whole);
         let options =
@@ -117,17 +120,10 @@ fn predicted_px(_plan: &FramePlan) -> Option<f64> {
     None
 }
 
-/// Every so-many-th pixel of each kind. A stride prime to picture widths spreads them over columns.
+/// Pixels of each kind at random, the same on every machine.
 fn chosen(near: &[bool], whole: [u64; 2]) -> Vec<bool> {
-    let stride = [0, 1].map(|kind: usize| ((whole[kind] as usize / PICTURED[kind]).max(1) | 1) as u64);
-    let mut seen = [0_u64; 2];
-    near.iter()
-        .map(|near| {
-            let kind = usize::from(*near);
-            seen[kind] += 1;
-            seen[kind].is_multiple_of(stride[kind])
-        })
-        .collect()
+    let stride = [0, 1].map(|kind: usize| (whole[kind] / PICTURED[kind]).max(1));
+    near.iter().zip(0..).map(|(near, i)| hash(SEED, i).is_multiple_of(stride[usize::from(*near)])).collect()
 }
 
 #[cfg(test)]
@@ -141,11 +137,12 @@ mod tests {
         let whole = [false, true].map(|kind| near.iter().filter(|near| **near == kind).count() as u64);
         let only = chosen(&near, whole);
         for kind in [false, true] {
-            let count = only.iter().zip(&near).filter(|(only, near)| **only && **near == kind).count();
+            let count = only.iter().zip(&near).filter(|(only, near)| **only && **near == kind).count() as u64;
             let wanted = PICTURED[usize::from(kind)];
             assert!((wanted / 2..2 * wanted).contains(&count), "{count}");
         }
+        // Six to fifty a column: a few may be without.
         let columns = (0..width).filter(|x| (0..height).any(|y| only[y * width + x])).count();
-        assert_eq!(columns, width);
+        assert!(columns > width - 10, "{columns}");
     }
 }

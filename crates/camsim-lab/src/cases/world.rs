@@ -33,7 +33,7 @@ impl World {
     #[must_use]
     pub fn new(seed: u64) -> Self {
         // Equal variance an octave is an amplitude spectrum of 1/f, as natural pictures have. Relief falls faster: hills, no needles.
-        let relief = fractal(CELLS, 1, CELLS / 4, 0.5, seed ^ 3);
+        let relief = fractal(CELLS, 2, CELLS / 4, 0.5, seed ^ 3);
         let points = CELLS + 1;
         let at = |i: u32| f64::from(relief[((i / points % CELLS) * CELLS + i % points % CELLS) as usize]);
         Self {
@@ -69,7 +69,7 @@ impl World {
     #[must_use]
     pub fn town(&self, half_m: f64) -> Scene {
         let mut scene = self.plane();
-        scene.meshes.push(self.houses(half_m, &|_, _| 0.0));
+        scene.meshes.push(self.houses(half_m, 0.0, &|_, _| 0.0));
         scene
     }
 
@@ -81,16 +81,17 @@ impl World {
         let mut scene = self.hills(GROUND_M, relief_m)?;
         let cell_m = GROUND_M / f64::from(CELLS);
         let index = |m: f64| ((m / cell_m + 0.5 * f64::from(CELLS)).round().clamp(0.0, f64::from(CELLS))) as u32;
-        let houses = self.houses(half_m, &|north_m, east_m| {
-            // Row 0 is the north. Five metres below ground, so that no slope shows a house's underside.
-            relief_m * self.relief[((CELLS - index(north_m)) * (CELLS + 1) + index(east_m)) as usize] - 5.0
+        // Five metres into the ground, so that no slope shows a house's underside. Row 0 is the north.
+        let houses = self.houses(half_m, 5.0, &|north_m, east_m| {
+            relief_m * self.relief[((CELLS - index(north_m)) * (CELLS + 1) + index(east_m)) as usize]
         });
         scene.meshes.push(houses);
         Ok(scene)
     }
 
-    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, turned and moved at random.
-    fn houses(&self, half_m: f64, base_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
+    /// One mesh of boxes, 8 to 16 m wide and 6 to 20 m high, one in each square of 40 m, turned and moved at random. `ground_m` is the height
+    /// of the ground at (north, east).
+    fn houses(&self, half_m: f64, sunk_m: f64, ground_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
         const PLOT_M: f64 = 40.0;
         let mut mesh =
             Mesh { vertices: Vec::new(), indices: Vec::new(), texture: self.facade.clone(), origin_ned_m: DVec3::ZERO, wrap: Wrap::Repeat };
@@ -99,8 +100,9 @@ impl World {
             let random = |k: u64| unit(hash((i + 1000) as u64 * 4096 + (j + 1000) as u64, k));
             let centre = [f64::from(i) + 0.4 * (random(0) - 0.5), f64::from(j) + 0.4 * (random(1) - 0.5)].map(|plots| plots * PLOT_M);
             let half = [4.0 + 4.0 * random(2), 4.0 + 4.0 * random(3)];
-            let bottom_m = base_m(centre[0], centre[1]);
-            push_box(&mut mesh, centre, half, random(5) * std::f64::consts::PI, [bottom_m, bottom_m.max(0.0) + 6.0 + 14.0 * random(4)]);
+            let ground_m = ground_m(centre[0], centre[1]);
+            let heights_m = [ground_m - sunk_m, ground_m + 6.0 + 14.0 * random(4)];
+            push_box(&mut mesh, centre, half, random(5) * std::f64::consts::PI, heights_m);
         }
         mesh
     }
@@ -188,7 +190,7 @@ fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -
 }
 
 /// Finaliser of SplitMix64 (Steele, Lea & Flood 2014) over both words.
-fn hash(seed: u64, counter: u64) -> u64 {
+pub(crate) fn hash(seed: u64, counter: u64) -> u64 {
     let mut z = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(counter.wrapping_mul(0xd1b5_4a32_d192_ed03));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
