@@ -1,11 +1,13 @@
 //! Temporal inverse and gather: output ray + instant -> where to look in the ideal frame (paper section 6).
 //!
-//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`.
+//! f64 twins of `shaders/reverse/temporal_inverse/reproject.wgsl` and `shaders/reverse/gather/blur.wgsl`; the paper's own models are in
+//! [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
 
 pub mod displacement;
 pub mod edges;
+pub mod paper;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use std::{convert::Infallible, sync::Arc};
+use std::sync::Arc;
 
 use camsim_core::{
     plan::{TemporalStage, line_times},
@@ -15,23 +15,8 @@ use camsim_core::{
         displacement::{RK2_STEP_DEG, linear, rk2, rk2_steps},
     },
 };
-use camsim_gpu::engine::{Finished, IdealImages};
-use common::{engine, pattern, render, scenario, sequence, steady};
+use common::{engine, pattern, render, render_with_ideal, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
-
-fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, IdealImages) {
-    let engine = engine();
-    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
-    session.set_coords_phase(phase);
-    let mut found = None;
-    let mut keep = |finished| {
-        found = Some(finished);
-        Ok(())
-    };
-    session.render::<Infallible>([0], &mut keep).expect("render");
-    let ideal = session.read_ideal().expect("readable").expect("drawn");
-    (found.expect("one frame"), ideal)
-}
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
@@ -96,11 +81,12 @@ fn hills() -> Scene {
 struct Case {
     name: &'static str,
     height_m: f64,
+    pitch_deg: f64,
     velocity_ned_m_s: DVec3,
     rate_body_deg_s: DVec3,
     vibration: Option<VibrationSpec>,
     scene: Scene,
-    /// RMS in px that NUMERICS-like prototypes found for linear and rk2; the test allows for other scenes and a finer key depth.
+    /// RMS in px that linear and rk2 may have, about twice what they do have.
     within_px: [f64; 2],
 }
 
@@ -109,6 +95,7 @@ fn cases() -> Vec<Case> {
     let case = |name, height_m, velocity_ned_m_s, rate_body_deg_s, scene, within_px| Case {
         name,
         height_m,
+        pitch_deg: -90.0,
         velocity_ned_m_s,
         rate_body_deg_s,
         vibration: None,
@@ -120,7 +107,7 @@ fn cases() -> Vec<Case> {
         // Straight down, the body's yaw axis is the optical axis.
         case("roll 120 deg/s", 300.0, still, DVec3::new(0.0, 0.0, 120.0), pattern(6000.0), [0.15, 2e-3]),
         case("pitch 120 deg/s", 300.0, still, DVec3::new(0.0, 120.0, 0.0), pattern(6000.0), [0.4, 4e-3]),
-        case("plane 30 m/s", 150.0, DVec3::new(30.0, 0.0, 0.0), still, pattern(6000.0), [1e-3, 1e-3]),
+        Case { pitch_deg: -60.0, ..case("plane 30 m/s", 150.0, DVec3::new(30.0, 0.0, 0.0), still, pattern(6000.0), [1e-3, 1e-3]) },
         case("terrain 100 m/s", 150.0, DVec3::new(100.0, 0.0, 0.0), still, hills(), [0.05, 0.05]),
         Case { vibration: Some(vibration), ..case("vibration 100 Hz 0.2 deg", 300.0, still, still, hills(), [20.0, 20.0]) },
     ]
@@ -128,9 +115,9 @@ fn cases() -> Vec<Case> {
 
 fn of_case(case: &Case, solver: Solver, iterations: Auto<u32>) -> Arc<Sequence> {
     let mut scenario: Scenario = scenario();
-    scenario.camera.size_px = [320, 240];
-    scenario.camera.focal_px = [153.8, 153.8];
-    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+    scenario.camera.size_px = [160, 120];
+    scenario.camera.focal_px = [76.9, 76.9];
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, case.pitch_deg, 0.0], ..MountSpec::default() };
     scenario.camera.mount.vibration.extend(case.vibration.clone());
     scenario.camera.shutter = ShutterSpec { readout_ms: 33.0, ..ShutterSpec::default() };
     scenario.quality.solver = Auto::Value(solver);
@@ -140,7 +127,7 @@ fn of_case(case: &Case, solver: Solver, iterations: Auto<u32>) -> Arc<Sequence> 
     sequence(scenario, steady(case.height_m, 20.0, case.velocity_ned_m_s, rate), case.scene.clone())
 }
 
-/// The ladder of NUMERICS section 2 on this renderer: `cargo test -p camsim-gpu --test solvers -- --nocapture` prints it.
+/// The ladder of solvers on this renderer, a quarter of 640x480 a side (errors in px scale with that): `cargo test -p camsim-gpu --test solvers -- --nocapture` prints it.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn errors_against_rays_cast_into_the_scene() {
@@ -161,7 +148,7 @@ fn errors_against_rays_cast_into_the_scene() {
                 assert_eq!(done.plan.temporal, TemporalStage::Reproject { iterations });
             }
             let oracle = Oracle::new(sequence).expect("a camera");
-            let errors: CoordErrors = coord_errors(&oracle, &done.plan, &done.frame, 0.0, 2).expect("coords");
+            let errors: CoordErrors = coord_errors(&oracle, &done.plan, &done.frame, 0.0, 1).expect("coords");
             let all = errors.all;
             eprintln!("{:26} {name:13} RMS {:.2e} p99 {:.2e} max {:.2e} px", case.name, all.rms_px, all.p99_px, all.max_px);
             assert!(all.count > 19_000 && errors.missing == 0 && errors.falsely_valid == 0, "{errors:?}");

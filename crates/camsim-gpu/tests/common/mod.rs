@@ -12,7 +12,10 @@ use camsim_core::{
     sequence::Sequence,
     trajectory::Trajectory,
 };
-use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
+use camsim_gpu::{
+    AdapterChoice, Engine,
+    engine::{Finished, IdealImages},
+};
 use glam::{DQuat, DVec3, EulerRot};
 
 /// The software adapter: figures compare between machines.
@@ -114,4 +117,19 @@ pub fn render_at_phase(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Ch
 /// Renders one frame.
 pub fn render(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Finished {
     render_at_phase(engine, sequence, channels, frame, 0.0)
+}
+
+/// Frame 0 with coordinates of the given phase, and the ideal frame that it was gathered from.
+pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, IdealImages) {
+    let engine = engine();
+    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords]).expect("session");
+    session.set_coords_phase(phase);
+    let mut found = None;
+    let mut keep = |finished| {
+        found = Some(finished);
+        Ok(())
+    };
+    session.render::<Infallible>([0], &mut keep).expect("render");
+    let ideal = session.read_ideal().expect("readable").expect("drawn");
+    (found.expect("one frame"), ideal)
 }
