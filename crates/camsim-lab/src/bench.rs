@@ -361,3 +361,82 @@ fn of_truth(sequence: &Arc<Sequence>) -> Arc<Sequence> {
     sequence.scenario.quality = Default::default();
     Arc::new(sequence)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(case: &str, group: &'static str, knob: &str, ms: f64, rms_px: f64) -> Row {
+        let times = Times { wall_ms: vec![ms; 3], ..Times::default() };
+        let mut row = Row { knob: knob.into(), group, coord_rms_px: Some(rms_px), ..Row::empty(case, [640, 480]) };
+        row.set_times(&times, Some(&times));
+        row
+    }
+
+    fn report() -> Report {
+        Report {
+            version: "0",
+            adapter: "an adapter".into(),
+            cpu_threads: 2,
+            quick: false,
+            rows: vec![
+                row("plane-30", "smooth", DEFAULT, 10.0, 0.01),
+                row("plane-30", "smooth", "rk2", 8.0, 0.1),
+                row("blender-plane", "all effects", DEFAULT, 12.0, 0.02),
+            ],
+            ablation: vec![
+                AblationRow { without: "nothing".into(), ms_per_frame_p50: 20.0, cpu_ms_per_frame: None, to_full_ms: Some([0.0; 3]) },
+                AblationRow { without: "lens".into(), ms_per_frame_p50: 25.0, cpu_ms_per_frame: None, to_full_ms: Some([4.0, 5.0, 6.0]) },
+            ],
+            violations: Vec::new(),
+            refused: Vec::new(),
+            about: BTreeMap::from([("plane-30".to_owned(), "a plane"), ("blender-plane".to_owned(), "another")]),
+            elapsed_s: 1.0,
+        }
+    }
+
+    #[test]
+    fn the_stable_keys_of_a_row_are_there() {
+        let json = serde_json::to_value(report()).expect("JSON");
+        assert!(json["adapter"].is_string() && json["version"].is_string());
+        let keys = [
+            "case", "preset", "width", "height", "ms_per_frame_p50", "ms_per_frame_p99", "cpu_ms_per_frame", "coord_rms_px", "coord_p99_px",
+            "coord_max_px", "psnr_db", "predicted_px",
+        ];
+        for row in json["rows"].as_array().expect("rows") {
+            for key in keys {
+                assert!(row.get(key).is_some(), "{key} in {row}");
+            }
+            assert!(row["psnr_db"].is_null(), "what was not measured is null");
+        }
+    }
+
+    #[test]
+    fn tables_have_every_row_and_say_what_was_not_kept() {
+        let report = report();
+        let text = report.markdown();
+        for line in text.lines().filter(|line| line.starts_with('|')) {
+            assert!(line.ends_with('|'), "{line}");
+        }
+        let table: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("### plane-30")).skip(4).take(4).collect();
+        assert!(table.iter().all(|line| line.matches('|').count() == table[0].matches('|').count()), "{table:#?}");
+        assert!(text.contains("| Blender Cycles, two cores | 8900 |"), "{text}");
+        // A frame without its lens takes longer: the promise is not kept, and the table says so.
+        assert!(text.contains("| a frame takes less time without an effect | more without lens | no |"), "{text}");
+        assert_eq!(report.csv().lines().count(), 1 + report.rows.len());
+        let svg = report.plot().expect("a plot");
+        assert!(svg.contains("smooth") && svg.contains("all effects"));
+    }
+
+    #[test]
+    fn cases_are_chosen_by_name_and_by_group() {
+        let names = |list: &[&str], quick: bool| {
+            let options = Options { cases: list.iter().map(|name| (*name).to_owned()).collect(), quick };
+            choose(cases().expect("cases"), &options).map(|cases| cases.iter().map(|case| case.name).collect::<Vec<_>>())
+        };
+        assert_eq!(names(&["lens-s3", "vibration"], false).expect("cases"), ["vibration-100", "vibration-200", "lens-s3"]);
+        assert_eq!(names(&[], true).expect("cases"), QUICK);
+        let unknown = names(&["lens-s4"], false).expect_err("no such case").to_string();
+        assert!(unknown.contains("lens-s4") && unknown.contains("lens-s3"), "{unknown}");
+    }
+}
