@@ -10,4 +10,5 @@ pub mod info;
 pub mod lens;
 pub mod render;
 pub mod track;
+pub mod verify;
 pub mod viewer;

@@ -29,6 +29,7 @@ Examples:
   camsim render flight.toml -o frames             every frame of a scenario
   camsim render flight.toml --frames 0..10 --set camera.shutter.readout_ms=0
   camsim explain flight.toml --frame 7            what a frame takes, and what it doesn't
+  camsim verify flight.toml                       how far off its pixels are, and were said to be
   camsim camera import calib.yaml -o CAMERA.toml  calibrations of other programs
 
 Exit codes:
@@ -58,6 +59,7 @@ enum Command {
     Demo(commands::demo::Args),
     Render(commands::render::Args),
     Explain(commands::explain::Args),
+    Verify(commands::verify::Args),
     Track(commands::track::Args),
     Lens(commands::lens::Args),
     Camera(commands::camera::Args),
@@ -95,6 +97,7 @@ fn dispatch(command: Command, console: &mut Console<'_>) -> Result<(), Failure> 
         Command::Demo(args) => commands::demo::run(&args, console),
         Command::Render(args) => commands::render::run(&args, console),
         Command::Explain(args) => commands::explain::run(&args, console),
+        Command::Verify(args) => commands::verify::run(&args, console),
         Command::Track(args) => commands::track::run(&args, console),
         Command::Lens(args) => commands::lens::run(&args, console),
         Command::Camera(args) => commands::camera::run(&args, console),

@@ -28,12 +28,25 @@ fn assets() -> PathBuf {
 fn help_names_every_command_and_every_exit_code() {
     let (code, out, err) = camsim(["--help"]);
     assert_eq!((code, err.as_str()), (0, ""));
-    for word in
-        ["demo", "render", "explain", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions", "Exit codes", "CAMSIM_ADAPTER"]
-    {
+    for word in [
+        "demo",
+        "render",
+        "explain",
+        "verify",
+        "track",
+        "lens",
+        "camera",
+        "compare",
+        "bench",
+        "info",
+        "viewer",
+        "completions",
+        "Exit codes",
+        "CAMSIM_ADAPTER",
+    ] {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
-    for command in ["demo", "render", "explain", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions"] {
+    for command in ["demo", "render", "explain", "verify", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions"] {
         let (code, out, _) = camsim([command, "--help"]);
         assert_eq!(code, 0, "{command}");
         assert!(out.contains("Usage: camsim"), "{out}");
@@ -154,6 +167,31 @@ fn the_built_in_flight_is_tracked_and_explained() {
 }
 
 #[test]
+fn the_predicted_error_is_explained_by_cause() {
+    let scenario = assets().join("pattern.toml");
+    let explain = |more: &[&str]| {
+        let (code, out, err) = camsim([&["explain", text(&scenario)], more].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    let out = explain(&[]);
+    assert!(out.contains("predicted error") && out.contains("within the tolerance") && out.contains("single precision"), "{out}");
+    let of = |more: &[&str]| serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"], more].concat())).unwrap()["plan"].clone();
+    let plan = of(&[]);
+    let predicted = &plan["predicted"];
+    let total_px = predicted["total_px"].as_f64().unwrap();
+    assert!(total_px > 0.0 && total_px <= 0.05 && predicted["kept"] == true && predicted["in_the_way"].is_null(), "{predicted}");
+    // The paper's own model of the motion is worse, and single precision has a floor: both are said.
+    let linear = of(&["--set", "quality.solver=linear"]);
+    assert!(linear["predicted"]["temporal_px"].as_f64().unwrap() > predicted["temporal_px"].as_f64().unwrap(), "{linear}");
+    let floor = of(&["--set", "quality.max_error_px=1e-7"]);
+    assert!(
+        floor["predicted"]["kept"] == false && floor["predicted"]["in_the_way"].as_str().unwrap().contains("single precision"),
+        "{floor}"
+    );
+}
+
+#[test]
 fn the_printed_scenario_is_a_scenario() {
     let (code, out, _) = camsim(["render", "--print-default"]);
     assert_eq!(code, 0);
@@ -200,6 +238,8 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),
         (vec!["explain", &scenario, "--frame", "60"], "ends with frame 59"),
         (vec!["explain", &scenario, "--set", "flight.window_s=[1.0, 1.001]", "--set", "camera.phase=0.9"], "window_s"),
+        (vec!["verify", &scenario, "--frames", "58..99"], "ends with frame 59"),
+        (vec!["verify", "nowhere.toml"], "nowhere.toml"),
         (vec!["track", &scenario, "--rate", "0"], "--rate"),
         (vec!["track", &scenario, "--rate", "NaN"], "--rate"),
         (vec!["track", &scenario, "--json"], "--report"),

@@ -72,3 +72,28 @@ fn timing_runs_write_no_frame() {
     assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
     assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
 }
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_measured_error_stands_beside_the_predicted_one() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let verify = |more: &[&str]| {
+        let small =
+            ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
+        camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "3,20"], &small, more].concat())
+    };
+    let (code, out, err) = verify(&["--json"]);
+    assert_eq!(code, 0, "{out}{err}");
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(report["kept"], true);
+    for frame in report["frames"].as_array().unwrap() {
+        let (measured, predicted) = (&frame["measured"]["smooth"], &frame["predicted"]);
+        let p99_px = measured["p99_px"].as_f64().unwrap();
+        assert!(measured["pixels"].as_u64().unwrap() > 1000 && p99_px > 0.0, "{frame}");
+        assert!(p99_px <= predicted["total_px"].as_f64().unwrap() && frame["as_predicted"] == true, "{frame}");
+        assert!(frame["measured"]["falsely_valid"] == 0 && frame["measured"]["missing"] == 0, "{frame}");
+    }
+    // Straight steps at constant velocity in a turn: beyond the tolerance, and the exit code says so.
+    let (code, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=0.002"]);
+    assert!(code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"), "{out}{err}");
+}

@@ -22,15 +22,22 @@ use crate::{
 
 mod bounds;
 mod describe;
+mod dry_run;
 mod edges;
+mod error;
 mod forced;
+mod grain;
+mod levels;
 mod lines;
 mod motion;
 pub mod paper;
+mod probes;
+mod rounding;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
+pub use error::Predicted;
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
 
@@ -182,6 +189,11 @@ pub struct FramePlan {
     pub truth: bool,
     /// What the choices rest on.
     pub motion: Motion,
+    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px`, or less where the parallax within the
+    /// frame would turn the difference into an error of the coordinates.
+    pub terrain_error_px: f64,
+    /// How far the pixels' sources will be off.
+    pub predicted: Predicted,
     /// What is not done.
     pub skipped: Vec<Skip>,
 }
@@ -202,6 +214,7 @@ pub struct Planner {
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
     outline: edges::SceneOutline,
+    grain: grain::SceneGrain,
     truth: bool,
     max_side_px: u32,
 }
@@ -221,7 +234,8 @@ impl Planner {
         };
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let outline = edges::SceneOutline::new(&sequence.scene);
-        Ok(Self { sequence, shutter, zoom, fixed, outline, truth, max_side_px })
+        let grain = grain::SceneGrain::new(&sequence.scene);
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, truth, max_side_px })
     }
 
     /// The sequence.
@@ -285,18 +299,33 @@ impl Planner {
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = if is_paper { paper::ray_stage(&reach.camera) } else { ray_stage(&reach, &mut skipped) };
-        let temporal =
-            demanded.unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
         let (blur, edges) = if is_paper {
             skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
             (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
-            let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
-            let blur = forced::blur_stage(temporal, blur, quality, &motion);
+            let blur = motion::blur_stage(&motion, quality, &reach, path, &self.shutter, stamp_s, &ideal, &mut skipped);
+            let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, quality, &motion));
             let travel_m = motion.travel_m;
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
             (blur, edges)
         };
+        let max_taps = if is_paper { 1 } else { quality.footprint_taps.value().unwrap_or(4).max(1) };
+        let case = error::Case {
+            reach: &reach,
+            sequence: &self.sequence,
+            shutter: &self.shutter,
+            stamp_s,
+            key_s,
+            key_pose: &key_pose,
+            ideal: &ideal,
+            key_twist,
+            ray,
+            blur,
+            max_taps,
+            grain: &self.grain,
+        };
+        let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
+        motion::note_skips(&motion, temporal, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
@@ -315,10 +344,12 @@ impl Planner {
             temporal,
             blur,
             edges,
-            max_taps: if is_paper { 1 } else { quality.footprint_taps.value().unwrap_or(4).max(1) },
+            max_taps,
             linear_fog: if is_paper { paper::fog(scene) } else { None },
             truth: self.truth,
             motion,
+            terrain_error_px,
+            predicted,
             skipped,
         })
     }

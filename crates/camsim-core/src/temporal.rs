@@ -56,19 +56,25 @@ impl InverseDepthImage<'_> {
             f64::from(self.values[y * self.size_px[0] as usize + x])
         };
         let (d00, d10, d01, d11) = (load(0.0, 0.0), load(1.0, 0.0), load(0.0, 1.0), load(1.0, 1.0));
-        let low = d00.min(d10).min(d01).min(d11);
-        let high = d00.max(d10).max(d01).max(d11);
-        if low > 0.9 * high {
-            let top = d00 + t.x * (d10 - d00);
-            let bottom = d01 + t.x * (d11 - d01);
-            top + t.y * (bottom - top)
-        } else {
-            match (t.x > 0.5, t.y > 0.5) {
-                (false, false) => d00,
-                (true, false) => d10,
-                (false, true) => d01,
-                (true, true) => d11,
-            }
+        blend_inverse_depths([d00, d10, d01, d11], t)
+    }
+}
+
+/// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the way right and down.
+#[must_use]
+pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
+    let low = d00.min(d10).min(d01).min(d11);
+    let high = d00.max(d10).max(d01).max(d11);
+    if low > 0.9 * high {
+        let top = d00 + t.x * (d10 - d00);
+        let bottom = d01 + t.x * (d11 - d01);
+        top + t.y * (bottom - top)
+    } else {
+        match (t.x > 0.5, t.y > 0.5) {
+            (false, false) => d00,
+            (true, false) => d10,
+            (false, true) => d01,
+            (true, true) => d11,
         }
     }
 }

@@ -159,6 +159,7 @@ struct Drawn {
     pose: CameraPose,
     ideal: IdealGeometry,
     edges: EdgeStage,
+    terrain_error_px: f64,
     target: usize,
     lod: LodSelection,
 }
@@ -359,7 +360,12 @@ impl Session<'_> {
 
     /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
     fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
-        if self.drawn.as_ref().is_some_and(|drawn| drawn.pose == plan.key_pose && drawn.ideal == plan.ideal && drawn.edges == plan.edges) {
+        if self.drawn.as_ref().is_some_and(|drawn| {
+            drawn.pose == plan.key_pose
+                && drawn.ideal == plan.ideal
+                && drawn.edges == plan.edges
+                && drawn.terrain_error_px == plan.terrain_error_px
+        }) {
             return;
         }
         let gpu = &self.engine.gpu;
@@ -384,10 +390,11 @@ impl Session<'_> {
             &sequence.scene,
             &self.buffers,
             plan,
-            sequence.scenario.quality.max_terrain_error_px,
+            plan.terrain_error_px,
             &self.targets[target],
         );
-        self.drawn = Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, target, lod });
+        self.drawn =
+            Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
     }
 
     /// Pass 3: the output frame.

@@ -119,7 +119,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 /// The choice that the ideal pass makes.
 fn level_of_detail(loaded: &Loaded, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = loaded.sequence.scene.terrain.as_ref()?;
-    let tolerance_px = loaded.sequence.scenario.quality.max_terrain_error_px;
+    let tolerance_px = plan.terrain_error_px;
     let lod = select_lod(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
     Some(LevelOfDetail { triangles: lod.triangles, max_error_px: lod.max_error_px, tolerance_px })
 }

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::TemporalStage;
+use super::{
+    TemporalStage,
+    probes::{Probe, probes},
+};
 use crate::{
     camera::CameraModel,
     mount::CameraPath,
@@ -31,6 +34,8 @@ pub struct LensReach {
     pub rays: Vec<(DVec2, [u32; 2])>,
     /// d(ideal px)/d(output px) in its lesser direction, tenth percentile over the image: below 1 the lens magnifies.
     pub least_stretch: f64,
+    /// Pixels at which errors are predicted.
+    pub(super) probes: Vec<Probe>,
 }
 
 impl LensReach {
@@ -54,7 +59,8 @@ impl LensReach {
         let mut stretches: Vec<f64> = candidates.iter().step_by(7).map(|(uv, _)| least_stretch(&camera, *uv)).collect();
         stretches.sort_by(f64::total_cmp);
         let least_stretch = stretches.get(stretches.len() / 10).copied().unwrap_or(1.0);
-        (!rays.is_empty()).then_some(Self { camera, rays, least_stretch })
+        let probes = probes(&camera);
+        (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes })
     }
 
     /// Largest `sqrt(1 + u^2 + v^2)`: slant range over planar depth.

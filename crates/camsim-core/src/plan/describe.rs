@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
+use super::{BlurStage, EdgeStage, FramePlan, Motion, Predicted, RayStage, Skip, TemporalStage};
 use crate::{scenario::Preset, temporal::displacement::RK2_STEP_DEG};
 
 /// The plan's figures, ready to serialise.
@@ -44,6 +44,10 @@ pub struct PlanSummary<'a> {
     pub max_footprint_taps: u32,
     /// Bounds behind the choices.
     pub motion: Motion,
+    /// Bound on the displacement of the drawn terrain, ideal pixels.
+    pub terrain_error_px: f64,
+    /// How far the pixels' sources will be off, by cause.
+    pub predicted: &'a Predicted,
     /// What is not done.
     pub skipped: &'a [Skip],
 }
@@ -117,8 +121,42 @@ impl FramePlan {
             edges: self.edges,
             max_footprint_taps: self.max_taps,
             motion: self.motion,
+            terrain_error_px: self.terrain_error_px,
+            predicted: &self.predicted,
             skipped: &self.skipped,
         }
+    }
+}
+
+impl Predicted {
+    /// By cause, the largest first.
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, .. } = *self;
+        writeln!(f, "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)")?;
+        let verdict = if self.kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" };
+        writeln!(f, "  at most {total_px:.2e} in all, from dry runs of {probes} pixels: {verdict}")?;
+        if let Some(cause) = &self.in_the_way {
+            writeln!(f, "  in the way: {cause}")?;
+        }
+        let detail = if level_of_detail_px > 0.0 { format!(" (level of detail {level_of_detail_px:.2e})") } else { String::new() };
+        let mut causes = [
+            (self.lens_px, "lens inverse", ""),
+            (self.temporal_px, "temporal inverse", ""),
+            (self.depth_px, "depth between pixels", detail.as_str()),
+            (self.nodes_px, "straight path between exposure nodes", ""),
+            (self.format_px, "single precision", ""),
+        ];
+        causes.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for (px, cause, more) in causes.into_iter().filter(|cause| cause.0 > 0.0) {
+            writeln!(f, "  {px:.2e} {cause}{more}")?;
+        }
+        if silhouette_share > 0.0 {
+            writeln!(f, "  apart: {:.1} % of the pixels tried stand at a silhouette and are off by more", 100.0 * silhouette_share)?;
+        }
+        writeln!(
+            f,
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples"
+        )
     }
 }
 
@@ -140,6 +178,7 @@ impl fmt::Display for FramePlan {
         )?;
         writeln!(f, "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)")?;
         writeln!(f, "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px")?;
+        self.predicted.write(f)?;
         writeln!(f, "passes")?;
         for pass in self.passes() {
             writeln!(f, "  {pass}")?;

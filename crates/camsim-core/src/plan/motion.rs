@@ -66,16 +66,16 @@ fn blur_path(
     if exposure_s <= 0.0 {
         return (0.0, 0.0);
     }
-    const STEPS: u32 = 16;
+    let steps = (NODES_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
     let (mut longest, mut sagitta) = (0.0_f64, 0.0_f64);
     let every = (reach.rays.len() / 24).max(1);
     for &(uv, [x, y]) in reach.rays.iter().step_by(every) {
         let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
         let mid = path.pose(mid_s);
         for w in [0.0, inverse_near] {
-            let at: Vec<DVec2> = (0..=STEPS)
+            let at: Vec<DVec2> = (0..=steps)
                 .filter_map(|k| {
-                    let t_s = mid_s + exposure_s * (f64::from(k) / f64::from(STEPS) - 0.5);
+                    let t_s = mid_s + exposure_s * (f64::from(k) / f64::from(steps) - 0.5);
                     let (rotation, shift) = path.pose(t_s).relative_to(&mid);
                     let p = rotation * uv.extend(1.0) + w * shift;
                     (p.z > 0.02).then(|| ideal.focal_px * p.truncate() / p.z)
@@ -83,8 +83,8 @@ fn blur_path(
                 .collect();
             longest = longest.max(at.windows(2).map(|pair| pair[0].distance(pair[1])).sum());
             if let (Some(&a), Some(&b)) = (at.first(), at.last()) {
-                let steps = (at.len() - 1).max(1) as f64;
-                let miss = at.iter().enumerate().map(|(k, p)| p.distance(a.lerp(b, k as f64 / steps))).fold(0.0, f64::max);
+                let last = (at.len() - 1).max(1) as f64;
+                let miss = at.iter().enumerate().map(|(k, p)| p.distance(a.lerp(b, k as f64 / last))).fold(0.0, f64::max);
                 sagitta = sagitta.max(miss);
             }
         }
@@ -92,39 +92,65 @@ fn blur_path(
     (longest, sagitta)
 }
 
-/// The cheapest temporal inverse within the tolerance.
-pub(super) fn temporal_stage(motion: &Motion, quality: &QualitySpec, focal_px: f64, skipped: &mut Vec<Skip>) -> TemporalStage {
-    let negligible_px = NEGLIGIBLE * quality.max_error_px;
-    if motion.parallax_px > negligible_px {
-        return TemporalStage::Reproject { iterations: iterations(motion.parallax_px, focal_px, negligible_px) };
+/// Largest miss of the chords of so many equal stretches of the exposure, in their middles: of up to eight stretches of a few rays, at
+/// both depth extremes.
+fn chords_px(
+    reach: &LensReach,
+    path: &CameraPath,
+    shutter: &Shutter,
+    stamp_s: f64,
+    ideal: &IdealGeometry,
+    near_m: f64,
+    segments: u32,
+) -> f64 {
+    const LOOKED_AT: u32 = 8;
+    let looked_at = LOOKED_AT.min(segments);
+    let mut worst = 0.0_f64;
+    for &(uv, [x, y]) in reach.rays.iter().step_by((reach.rays.len() / 24).max(1)) {
+        let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+        let mid = path.pose(mid_s);
+        for w in [0.0, 1.0 / near_m] {
+            let place = |along: f64| {
+                let t_s = mid_s + shutter.exposure_s() * (along / f64::from(segments) - 0.5);
+                let (rotation, shift) = path.pose(t_s).relative_to(&mid);
+                let p = rotation * uv.extend(1.0) + w * shift;
+                (p.z > 0.02).then(|| ideal.focal_px * p.truncate() / p.z)
+            };
+            for k in (0..looked_at).map(|k| f64::from(k * segments / looked_at)) {
+                if let (Some(begin), Some(middle), Some(end)) = (place(k), place(k + 0.5), place(k + 1.0)) {
+                    worst = worst.max(middle.distance(0.5 * (begin + end)));
+                }
+            }
+        }
     }
-    skipped.push(Skip {
-        what: "depth in the temporal inverse",
-        reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px),
-    });
-    if motion.rotation_px > negligible_px {
-        return TemporalStage::Rotation;
-    }
-    skipped.push(Skip {
-        what: "temporal inverse",
-        reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
-    });
-    TemporalStage::Identity
+    worst
 }
 
-/// Depth look-ups so that `rho^n * parallax` is negligible. The contraction rho is `parallax * |grad w| / w`; on a surface seen at up to
-/// about 70 deg from its normal `|grad w| / w <= 3 / f`.
-fn iterations(parallax_px: f64, focal_px: f64, negligible_px: f64) -> u32 {
-    let rho = (3.0 * parallax_px / focal_px).clamp(0.01, 0.5);
-    ((negligible_px / parallax_px).ln() / rho.ln()).ceil().clamp(2.0, 8.0) as u32
+/// What the choice of a temporal inverse leaves out, and why nothing is lost.
+pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut Vec<Skip>) {
+    if matches!(temporal, TemporalStage::Rotation | TemporalStage::Identity) {
+        skipped.push(Skip {
+            what: "depth in the temporal inverse",
+            reason: format!("parallax within the frame is at most {:.2e} px", motion.parallax_px),
+        });
+    }
+    if temporal == TemporalStage::Identity {
+        skipped.push(Skip {
+            what: "temporal inverse",
+            reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
+        });
+    }
 }
 
 /// Nodes and samples of the exposure, or `None` when it does not show.
 pub(super) fn blur_stage(
     motion: &Motion,
     quality: &QualitySpec,
+    reach: &LensReach,
     path: &CameraPath,
     shutter: &Shutter,
+    stamp_s: f64,
+    ideal: &IdealGeometry,
     skipped: &mut Vec<Skip>,
 ) -> Option<BlurStage> {
     if shutter.exposure_s() <= 0.0 {
@@ -135,12 +161,21 @@ pub(super) fn blur_stage(
         skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {:.2e} px", motion.blur_px) });
         return None;
     }
-    // The chord's miss falls with the square of the number of segments; half the tolerance goes to it.
-    let by_curve = (motion.blur_sagitta_px / (0.5 * quality.max_error_px)).sqrt().ceil();
+    // The chord's miss falls with the square of the number of stretches, once these are shorter than the bends; half the tolerance is its.
+    let allowed_px = 0.5 * quality.max_error_px;
+    let by_curve = (motion.blur_sagitta_px / allowed_px).sqrt().ceil();
     let by_vibration = (NODES_PER_PERIOD * path.highest_vibration_hz() * shutter.exposure_s()).ceil();
-    let segments = by_curve.max(if motion.blur_sagitta_px > NEGLIGIBLE * quality.max_error_px { by_vibration } else { 1.0 });
-    let nodes = segments.clamp(1.0, f64::from(MAX_NODES - 1)) as u32 + 1;
-    Some(samples_between(nodes, quality, motion))
+    let most = f64::from(MAX_NODES - 1);
+    let mut segments =
+        by_curve.max(if motion.blur_sagitta_px > NEGLIGIBLE * quality.max_error_px { by_vibration } else { 1.0 }).clamp(1.0, most);
+    for _ in 0..3 {
+        let miss_px = chords_px(reach, path, shutter, stamp_s, ideal, motion.nearest_m, segments as u32);
+        if miss_px <= allowed_px {
+            break;
+        }
+        segments = (segments * (1.05 * miss_px / allowed_px).sqrt()).ceil().min(most);
+    }
+    Some(samples_between(segments as u32 + 1, quality, motion))
 }
 
 /// Samples of an exposure of so many nodes.

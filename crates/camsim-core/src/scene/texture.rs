@@ -16,7 +16,7 @@ pub enum Encoding {
 
 impl Encoding {
     /// Linear light of each of the 256 byte values.
-    fn decode_table(self) -> [f32; 256] {
+    pub(crate) fn decode_table(self) -> [f32; 256] {
         std::array::from_fn(|byte| {
             let stored = byte as f32 / 255.0;
             match self {

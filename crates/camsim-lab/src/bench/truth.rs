@@ -8,7 +8,6 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    plan::FramePlan,
     reference::{CoordErrors, CoordTruth, Oracle, RenderOptions},
     scenario::Channel,
     sequence::Sequence,
@@ -94,7 +93,7 @@ impl Truth {
             psnr_db: psnr_db(share[0] * mean(0) + share[1] * mean(1)),
             edge_psnr_db: psnr_db(mean(1)),
             pictured: squares[0].1 + squares[1].1,
-            predicted_px: predicted_px(&plan),
+            predicted_px: Some(plan.predicted.total_px),
             passes: plan.passes(),
         })
     }
@@ -113,11 +112,6 @@ impl Truth {
         }
         sums
     }
-}
-
-/// The plan's bound on the 99th percentile of the coordinates' error.
-fn predicted_px(_plan: &FramePlan) -> Option<f64> {
-    None
 }
 
 /// Pixels of each kind at random, the same on every machine.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::{
-    Terrain,
+    ChunkDraw, Terrain,
     bounds::{BLOCK_CELLS, Node},
     stitch::cell_triangles,
 };
@@ -18,6 +18,10 @@ pub struct TerrainHit {
     pub uv: [f64; 2],
     /// Unit normal of the triangle, NED, towards the sky.
     pub normal_ned: DVec3,
+    /// Index of its chunk in [`Terrain::chunks`].
+    pub chunk: u32,
+    /// Its cell in the chunk, from the west and from the north.
+    pub cell: [u32; 2],
 }
 
 impl Terrain {
@@ -49,6 +53,29 @@ impl Terrain {
             stack[below..].sort_by(|a, b| b.0.total_cmp(&a.0));
         }
         best
+    }
+
+    /// Ray parameter at which a ray that meets the full surface at `hit` meets the surface as `draw` shows that chunk: the plane of the
+    /// coarser triangle over the hit. A coarser level moves the point by less than one of its cells, so its own cell's triangles do.
+    pub fn drawn_t(&self, hit: &TerrainHit, draw: &ChunkDraw, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
+        let chunk = &self.chunks[draw.chunk as usize];
+        if draw.level == 0 && draw.edge_levels == [0; 4] {
+            return hit.t;
+        }
+        let cell = hit.cell.map(|at| at >> draw.level);
+        let mut best = (f64::NEG_INFINITY, hit.t);
+        for corners in cell_triangles(cell, chunk.cells, draw.level, draw.edge_levels) {
+            let [a, b, c] = corners.map(|[i, j]| self.position_ned_m(draw.chunk, i, j) - origin_ned_m);
+            let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
+            let normal = (b - a).cross(c - a);
+            // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which never is the best.
+            let inside = wa.min(wb).min(wc).max(-wa.max(wb).max(wc)) / (wa + wb + wc).abs();
+            let t = a.dot(normal) / direction_ned.dot(normal);
+            if inside > best.0 && t > 0.0 {
+                best = (inside, t);
+            }
+        }
+        best.1
     }
 
     /// The full surface at a place of the tangent plane: the down coordinate of the topmost point, `None` off the terrain.
@@ -110,7 +137,8 @@ impl Terrain {
                     let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
                     let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
                     let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
-                    best = Some(TerrainHit { t, uv, normal_ned: if normal.z > 0.0 { -normal } else { normal } });
+                    let normal_ned = if normal.z > 0.0 { -normal } else { normal };
+                    best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell: [a, b] });
                 }
             }
         }
