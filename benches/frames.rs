@@ -17,6 +17,7 @@ use std::{
 use camsim::{
     core::scenario::Channel,
     gpu::{AdapterChoice, Engine, engine::Session},
+    lab::timing::{ms, processor_ms, quartiles},
 };
 
 mod flight;
@@ -110,21 +111,6 @@ fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> O
     })?)
 }
 
-fn ms(duration: Duration) -> f64 {
-    1e3 * duration.as_secs_f64()
-}
-
-/// Time that the threads of this program have had a processor (`/proc/self/task/*/schedstat`, first field: nanoseconds).
-fn processor_ms() -> Option<f64> {
-    let mut sum_ns = 0.0;
-    for task in std::fs::read_dir("/proc/self/task").ok()? {
-        // A thread may end while the folder is read.
-        let Ok(line) = std::fs::read_to_string(task.ok()?.path().join("schedstat")) else { continue };
-        sum_ns += line.split_whitespace().next()?.parse::<f64>().ok()?;
-    }
-    Some(1e-6 * sum_ns)
-}
-
 fn print_table(variants: &[Variant<'_>]) {
     let full = &variants[0];
     println!("rounds    {} of {BURST} frames, variants in turn; medians, quartiles in brackets", full.ms.len());
@@ -132,29 +118,17 @@ fn print_table(variants: &[Variant<'_>]) {
     println!("| variant | ms a frame | frames/s | to the full camera | processor ms a frame | to the full camera | start, s |");
     println!("|---|---|---|---|---|---|---|");
     for variant in variants {
-        let rate = 1e3 / quartiles(variant.ms.clone())[1];
+        let rate = 1e3 / quartiles(&variant.ms)[1];
         let own = [(&variant.ms, &full.ms), (&variant.processor_ms, &full.processor_ms)];
         let [wall, processor] = own.map(|(own, full)| match own.is_empty() {
             true => "not known | ".to_owned(),
             false => {
-                let [low, median, high] = quartiles(own.clone());
-                let [_, difference, _] = quartiles(own.iter().zip(full).map(|(own, full)| own - full).collect());
+                let [low, median, high] = quartiles(own);
+                let [_, difference, _] = quartiles(&own.iter().zip(full).map(|(own, full)| own - full).collect::<Vec<_>>());
                 format!("{median:.1} ({low:.1} .. {high:.1}) | {difference:+.1}")
             }
         });
         let (time, difference) = wall.split_once('|').unwrap_or_default();
         println!("| {} | {time}| {rate:.1} |{difference} | {processor} | {:.2} |", variant.name, variant.start.as_secs_f64());
     }
-}
-
-/// Lower quartile, median, upper quartile.
-fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_by(f64::total_cmp);
-    let at = |part: f64| {
-        let place = part * (values.len().saturating_sub(1)) as f64;
-        let (below, rest) = (place.floor() as usize, place.fract());
-        let value = |i: usize| values.get(i).or(values.last()).copied().unwrap_or(f64::NAN);
-        value(below) + rest * (value(below + 1) - value(below))
-    };
-    [at(0.25), at(0.5), at(0.75)]
 }

@@ -1,6 +1,7 @@
 //! One file a command: its arguments, its help, and `run`.
 
 pub mod apply;
+pub mod bench;
 pub mod camera;
 pub mod compare;
 pub mod completions;

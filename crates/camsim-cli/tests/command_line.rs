@@ -37,6 +37,7 @@ fn help_names_every_command_and_every_exit_code() {
         "camera",
         "apply",
         "compare",
+        "bench",
         "info",
         "viewer",
         "completions",
@@ -45,7 +46,7 @@ fn help_names_every_command_and_every_exit_code() {
     ] {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
-    for command in ["demo", "render", "explain", "track", "lens", "camera", "apply", "compare", "info", "viewer", "completions"] {
+    for command in ["demo", "render", "explain", "verify", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions"] {
         let (code, out, _) = camsim([command, "--help"]);
         assert_eq!(code, 0, "{command}");
         assert!(out.contains("Usage: camsim"), "{out}");

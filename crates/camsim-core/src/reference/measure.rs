@@ -1,5 +1,7 @@
 //! The error of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame, and of its light.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -65,11 +67,60 @@ enum Compared {
     Error { px: f64, at_silhouette: bool },
 }
 
+/// What the centre of every pixel of a frame sees, and which pixels are at silhouettes: looked at once, compared with any number of renderings.
+#[derive(Debug)]
+pub struct CoordTruth {
+    oracle: Arc<Oracle>,
+    looks: Vec<Option<Look>>,
+    near: Vec<bool>,
+}
+
+impl CoordTruth {
+    /// Looks at a frame at exposure phase `phase` (-0.5 to 0.5).
+    #[must_use]
+    pub fn new(oracle: Arc<Oracle>, frame: u64, phase: f64) -> Self {
+        let looks = looks(&oracle, frame, phase);
+        let size_px = oracle.sequence.scenario.camera.size_px;
+        let near = dilated(&edges(&looks, size_px), size_px);
+        Self { oracle, looks, near }
+    }
+
+    /// Pixels within 3 px of a silhouette, row-major.
+    #[must_use]
+    pub fn near_silhouettes(&self) -> &[bool] {
+        &self.near
+    }
+
+    /// Pixels whose centre has a ray, row-major.
+    pub fn valid(&self) -> impl Iterator<Item = bool> + '_ {
+        self.looks.iter().map(Option::is_some)
+    }
+
+    /// As [`coord_errors`], of a rendering of this frame.
+    #[must_use]
+    pub fn errors(&self, plan: &FramePlan, frame: &RenderedFrame, step: u32) -> Option<CoordErrors> {
+        compared(&self.oracle, &self.looks, &self.near, plan, frame, step)
+    }
+}
+
 /// Compares `coords` of a frame, rendered by `plan` at exposure phase `phase`, with the oracle: where the point that the pixel's own ray
 /// meets lies in the ideal frame. Every `step`-th pixel in both directions. A pixel counts as at a silhouette within 3 px of one, and where
 /// its true point is hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the sequence's.
 #[must_use]
 pub fn coord_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
+    let looks = looks(oracle, plan.frame, phase);
+    let size_px = oracle.sequence.scenario.camera.size_px;
+    compared(oracle, &looks, &dilated(&edges(&looks, size_px), size_px), plan, frame, step)
+}
+
+fn compared(
+    oracle: &Oracle,
+    looks: &[Option<Look>],
+    near: &[bool],
+    plan: &FramePlan,
+    frame: &RenderedFrame,
+    step: u32,
+) -> Option<CoordErrors> {
     let coords = frame.coords.as_ref()?;
     let [width, height] = frame.size_px;
     let pixels = width as usize * height as usize;
@@ -77,8 +128,6 @@ pub fn coord_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, ph
         return None;
     }
     let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
-    let looks = looks(oracle, plan.frame, phase);
-    let near = dilated(&edges(&looks, frame.size_px), frame.size_px);
     let compare = |i: usize| {
         let valid = frame.color_rgba[4 * i + 3] > 0.0;
         match (&looks[i], valid) {

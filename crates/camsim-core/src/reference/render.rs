@@ -37,11 +37,13 @@ pub struct RenderOptions {
     pub photometric: bool,
     /// The ideal frame that the source coordinates of [`Channel::Coords`] refer to; without one they are 0.
     pub key: Option<KeyFrame>,
+    /// Pixels that are rendered, row-major; the others are left invalid. `None` is all.
+    pub only: Option<Vec<bool>>,
 }
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { channels: vec![Channel::Color], min_samples: 32, max_samples: 1024, tolerance_dn: 0.25, photometric: true, key: None }
+        Self { channels: vec![Channel::Color], min_samples: 32, max_samples: 1024, tolerance_dn: 0.25, photometric: true, key: None, only: None }
     }
 }
 
@@ -170,7 +172,8 @@ impl Job<'_> {
         let mut instants = Instants::new(self, y);
         for x in 0..width {
             // A pixel is valid where its centre has a ray.
-            let valid = self.view.ray([x, y], DVec2::ZERO).is_some();
+            let wanted = self.options.only.as_ref().is_none_or(|only| only.get((y * width + x) as usize).copied().unwrap_or(false));
+            let valid = wanted && self.view.ray([x, y], DVec2::ZERO).is_some();
             if valid {
                 let pixel = self.pixel([x, y], &mut instants);
                 row.convergence.pixels += 1;

@@ -1,0 +1,105 @@
+//! `camsim bench`: run time against error.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_lab::bench::{BenchError, Options, Report, run as measure};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    output::write_output,
+};
+
+/// Measure run time against error on this machine: every case with every method
+///
+/// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the exact reference: of source
+/// coordinates in pixels, and of pictures in dB. The whole takes about ten minutes on two processor cores without a GPU, --quick less than one.
+/// Rows: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px, coord_max_px, psnr_db,
+/// predicted_px, and more behind them; null is what was not measured.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim bench --quick                        four cases, small pictures
+  camsim bench -o bench                       everything: bench.md, bench.json, bench.csv, bench.svg in ./bench
+  camsim bench --cases buildings,lens-s3      some cases or groups by name
+  camsim bench --quick --check                exit code 1 if a row chosen by the plan is beaten in time and error")]
+pub struct Args {
+    /// Cases or groups, with commas; a name that does not exist lists them all
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    cases: Vec<String>,
+    /// Few cases, pictures of 320x240, few rounds
+    #[arg(long)]
+    quick: bool,
+    /// Print JSON instead of tables
+    #[arg(long)]
+    json: bool,
+    /// Write the rows as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write error against time as a plot
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write all of it to a folder: bench.md, bench.json, bench.csv, bench.svg
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Fail if a row that the plan chose is beaten by another row of its case in both time and error
+    #[arg(long)]
+    check: bool,
+}
+
+/// Measures and prints.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    let options = Options { cases: args.cases.clone(), quick: args.quick };
+    let engine = Engine::new(AdapterChoice::Best)?;
+    console.note(format_args!("adapter: {}", engine.gpu().adapter));
+    let report = measure(&engine, &options, &mut |step| console.note(step)).map_err(failure)?;
+    if let Some(folder) = &args.output {
+        std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display())).or_failed()?;
+        write(&folder.join("bench.md"), &report.markdown(), console)?;
+        write(&folder.join("bench.json"), &json(&report)?, console)?;
+    }
+    let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
+    for path in [args.csv.clone(), beside("bench.csv")].into_iter().flatten() {
+        write(&path, &report.csv(), console)?;
+    }
+    let plots: Vec<_> = [args.plot.clone(), beside("bench.svg")].into_iter().flatten().collect();
+    if !plots.is_empty() {
+        let plot = report.plot().map_err(failure)?;
+        for path in plots {
+            write(&path, &plot, console)?;
+        }
+    }
+    if args.json {
+        console.print(&json(&report)?)?;
+    } else {
+        console.print(&report.markdown())?;
+    }
+    console.note(report.summary());
+    match report.violations.len() {
+        beaten if args.check && beaten > 0 => {
+            Err(Failure::failed(anyhow::anyhow!("{beaten} rows that the plan chose are beaten in both time and error; the table lists them")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn json(report: &Report) -> Result<String, Failure> {
+    let mut text = serde_json::to_string_pretty(report).or_failed()?;
+    text.push('\n');
+    Ok(text)
+}
+
+fn write(path: &Path, text: &str, console: &mut Console<'_>) -> Result<(), Failure> {
+    write_output(Some(path), console, |out| out.write_all(text.as_bytes()))
+}
+
+fn failure(error: BenchError) -> Failure {
+    match error {
+        BenchError::NoSuchCase { .. } => Failure::bad_input(error),
+        BenchError::Render(error) => error.into(),
+        BenchError::Gpu(error) => error.into(),
+        error => Failure::failed(error),
+    }
+}

@@ -1,0 +1,158 @@
+//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left.
+
+use std::sync::Arc;
+
+use camsim_core::{
+    mount::{CameraPath, MountError},
+    scenario::{LensSpec, ShutterSpec},
+    sequence::Sequence,
+};
+use camsim_gpu::Engine;
+use serde::Serialize;
+
+use super::{
+    BenchError, blit,
+    rounds::{self, Effort, Times},
+};
+use crate::timing::quartiles;
+
+/// Something that a perfect camera does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effect {
+    /// Gaussian noise.
+    Noise,
+    /// The vignette map.
+    Vignette,
+    /// The exposure, and with it motion blur.
+    Blur,
+    /// The shaking mount.
+    Vibration,
+    /// Distortion.
+    Lens,
+    /// The readout: every row at the same instant.
+    RollingShutter,
+    /// Samples at silhouettes: one a pixel.
+    Silhouettes,
+}
+
+/// All of them, in the order in which they are left out one after the other.
+pub const EFFECTS: [Effect; 7] =
+    [Effect::Noise, Effect::Vignette, Effect::Blur, Effect::Vibration, Effect::Lens, Effect::RollingShutter, Effect::Silhouettes];
+
+impl Effect {
+    /// For tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Noise => "noise",
+            Self::Vignette => "vignette",
+            Self::Blur => "motion blur",
+            Self::Vibration => "vibration",
+            Self::Lens => "lens",
+            Self::RollingShutter => "rolling shutter",
+            Self::Silhouettes => "samples at silhouettes",
+        }
+    }
+
+    /// Takes it out of a sequence.
+    fn leave_out(self, sequence: &mut Sequence) -> Result<(), MountError> {
+        let camera = &mut sequence.scenario.camera;
+        match self {
+            Self::Noise => camera.photometric.noise_sigma = 0.0,
+            Self::Vignette => {
+                camera.photometric.vignette = None;
+                sequence.vignette = None;
+            }
+            Self::Blur => camera.shutter.exposure_ms = 0.0,
+            Self::Vibration => {
+                camera.mount.vibration.clear();
+                sequence.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &camera.mount)?);
+            }
+            Self::Lens => camera.lens = LensSpec::default(),
+            Self::RollingShutter => {
+                camera.shutter = ShutterSpec { exposure_ms: camera.shutter.exposure_ms, ..ShutterSpec::default() };
+            }
+            Self::Silhouettes => sequence.scenario.quality.max_error_dn = 20.0,
+        }
+        Ok(())
+    }
+}
+
+/// A sequence without some effects.
+///
+/// # Errors
+/// A mount that cannot be used.
+pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>, MountError> {
+    let mut sequence = sequence.clone();
+    for effect in effects {
+        effect.leave_out(&mut sequence)?;
+    }
+    Ok(Arc::new(sequence))
+}
+
+/// One row of the ablation.
+#[derive(Clone, Debug, Serialize)]
+pub struct AblationRow {
+    /// What is left out.
+    pub without: String,
+    /// Milliseconds a frame, median of the rounds.
+    pub ms_per_frame_p50: f64,
+    /// Processor milliseconds a frame, median; null where it is not known.
+    pub cpu_ms_per_frame: Option<f64>,
+    /// Difference to the whole camera in the same round, quartiles, ms; null for the copy, which is measured apart.
+    pub to_full_ms: Option<[f64; 3]>,
+}
+
+/// Times of a camera without each effect, without more and more of them, without any over a picture that is kept, and of a bare copy.
+///
+/// # Errors
+/// Whatever the renderer meets.
+pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<Vec<AblationRow>, BenchError> {
+    let mut names = vec!["nothing: the whole camera".to_owned()];
+    let mut variants = vec![(full.clone(), false)];
+    for effect in EFFECTS {
+        names.push(effect.name().to_owned());
+        variants.push((without(full, &[effect])?, false));
+    }
+    for count in 2..=EFFECTS.len() {
+        let all = count == EFFECTS.len();
+        let last = EFFECTS[count - 1].name();
+        names.push(if all { format!("... and {last}: a perfect camera") } else if count == 2 { format!("{} and {last}", EFFECTS[0].name()) } else { format!("... and {last}") });
+        variants.push((without(full, &EFFECTS[..count])?, false));
+    }
+    names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());
+    variants.push((without(full, &EFFECTS)?, true));
+    let times = rounds::measure(engine, &variants, effort)?;
+    let mut rows: Vec<_> = names.into_iter().zip(&times).map(|(name, own)| row(name, own, Some(&times[0]))).collect();
+    let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, times[0].wall_ms.len().max(3), effort.burst)?;
+    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None));
+    Ok(rows)
+}
+
+fn row(without: String, own: &Times, full: Option<&Times>) -> AblationRow {
+    let to_full_ms = full.map(|full| quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>()));
+    AblationRow { without, ms_per_frame_p50: own.p50_p99_ms()[0], cpu_ms_per_frame: own.processor_p50_ms(), to_full_ms }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cases::cases;
+
+    #[test]
+    fn a_camera_without_anything_is_perfect() {
+        let cases = cases().expect("cases");
+        let full = &cases.iter().find(|case| case.name == "all-effects").expect("the case").sequence;
+        let bare = without(full, &EFFECTS).expect("a mount");
+        let camera = &bare.scenario.camera;
+        assert!(camera.lens == LensSpec::default() && camera.shutter == ShutterSpec::default() && camera.mount.vibration.is_empty());
+        assert!(camera.photometric.noise_sigma == 0.0 && camera.photometric.vignette.is_none() && bare.vignette.is_none());
+        // The path is the platform's own again.
+        assert_eq!(bare.path.highest_vibration_hz(), 0.0);
+        // Each effect is there to be left out.
+        for effect in EFFECTS {
+            let one = without(full, &[effect]).expect("a mount");
+            assert!(one.scenario != full.scenario, "{effect:?}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The rows of a case: its default, the paper's preset, and each method forced in turn.
+
+use std::sync::Arc;
+
+use camsim_core::{
+    plan::Planner,
+    scenario::{Auto, Channel, Preset, Scenario, Solver},
+    sequence::Sequence,
+};
+
+use crate::cases::{Case, Group};
+
+/// Name of the row that every other row of its case is compared with.
+pub const DEFAULT: &str = "auto 0.05 px";
+/// Largest texture side that the plan behind a rule of samples assumes.
+const MAX_SIDE_PX: u32 = 16_384;
+
+/// What a row varies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// The tolerance; everything is chosen by the plan.
+    Tolerance,
+    /// The paper's methods throughout.
+    Paper,
+    /// The temporal solver.
+    Solver,
+    /// Ideal frames for each output frame.
+    KeyFrames,
+    /// Samples over the exposure.
+    Blur,
+    /// Footprint taps.
+    Taps,
+    /// Samples at silhouettes.
+    Silhouettes,
+    /// Size of the picture.
+    Size,
+}
+
+/// One row to measure.
+#[derive(Clone, Debug)]
+pub struct Variant {
+    /// Its name, unique within its case.
+    pub knob: String,
+    /// What it varies.
+    pub family: Family,
+    /// What it renders.
+    pub sequence: Arc<Sequence>,
+}
+
+/// The rows of a case; `quick` keeps the default, the paper's and the solvers.
+#[must_use]
+pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
+    let mut rows = Vec::new();
+    let mut row = |knob: &str, family, edit: &dyn Fn(&mut Scenario)| {
+        let mut sequence = (*case.sequence).clone();
+        edit(&mut sequence.scenario);
+        rows.push(Variant { knob: knob.to_owned(), family, sequence: Arc::new(sequence) });
+    };
+    row(DEFAULT, Family::Tolerance, &|_| {});
+    row("paper", Family::Paper, &|scenario| scenario.quality.preset = Preset::Paper);
+    row("auto 1 px", Family::Tolerance, &|scenario| scenario.quality.max_error_px = 1.0);
+    row("auto 0.001 px", Family::Tolerance, &|scenario| scenario.quality.max_error_px = 1e-3);
+    if !matches!(case.group, Group::Lens | Group::Exposure) {
+        row("linear", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Linear));
+        row("rk2", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Rk2));
+        for look_ups in if quick { 2..=2 } else { 1..=3 } {
+            row(&format!("reproject x{look_ups}"), Family::Solver, &|scenario| scenario.quality.iterations = Auto::Value(look_ups));
+        }
+    }
+    if quick {
+        return rows;
+    }
+    let houses = case.sequence.scene.meshes.len() + usize::from(case.sequence.scene.terrain.is_some()) > 1;
+    if houses {
+        for keys in [2, 3] {
+            row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| scenario.quality.key_frames = Auto::Value(keys));
+        }
+        row("silhouettes: 1 sample", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 20.0);
+        row("silhouettes: 16 samples", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 0.5);
+    }
+    if matches!(case.group, Group::Exposure | Group::AllEffects)
+        && let Some(rule) = blur_rule(&case.sequence)
+    {
+        for times in [0.25, 0.5, 1.0, 2.0] {
+            let samples = (f64::from(rule) * times).ceil().max(1.0) as u32;
+            let name = format!("blur: {samples} samples ({times} x)");
+            row(&name, Family::Blur, &|scenario| scenario.quality.blur_samples = Auto::Value(samples));
+        }
+    }
+    if matches!(case.group, Group::Lens | Group::AllEffects) {
+        for taps in [1, 2, 4] {
+            row(&format!("taps: {taps} x {taps}"), Family::Taps, &|scenario| scenario.quality.footprint_taps = Auto::Value(taps));
+        }
+    }
+    if case.name == "all-effects" {
+        for size_px in [[320, 240], [1280, 960], [1920, 1080]] {
+            let [width, height] = size_px;
+            row(&format!("{width}x{height}"), Family::Size, &|scenario| resize(scenario, size_px));
+            row(&format!("{width}x{height}, paper"), Family::Size, &|scenario| {
+                resize(scenario, size_px);
+                scenario.quality.preset = Preset::Paper;
+            });
+        }
+    }
+    rows
+}
+
+/// Samples that the plan's own rule takes where the path over the exposure is longest.
+fn blur_rule(sequence: &Arc<Sequence>) -> Option<u32> {
+    let planner = Planner::new(sequence.clone(), &[Channel::Color], MAX_SIDE_PX).ok()?;
+    let blur = planner.plan(0).ok()?.blur?;
+    Some(blur.max_samples * (blur.nodes - 1).max(1))
+}
+
+/// The same view in another size: the focal length follows the height.
+pub fn resize(scenario: &mut Scenario, size_px: [u32; 2]) {
+    let camera = &mut scenario.camera;
+    let scale = f64::from(size_px[1]) / f64::from(camera.size_px[1]);
+    let middle = camera.size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
+    if let Some(principal) = &mut camera.principal_point_px {
+        *principal = [0, 1].map(|k: usize| 0.5 * (f64::from(size_px[k]) - 1.0) + scale * (principal[k] - middle[k]));
+    }
+    camera.focal_px = camera.focal_px.map(|focal| scale * focal);
+    camera.size_px = size_px;
+}

@@ -1,0 +1,136 @@
+//! Which rows of a case are worth their time.
+
+use serde::Serialize;
+
+use super::{Row, knobs::Family};
+
+/// Times differ if three quarters of the rounds say so, by this factor.
+const SLOWER: f64 = 1.02;
+/// Errors differ by this factor, and by more than single precision leaves, px.
+const WORSE: f64 = 1.1;
+const FLOOR_PX: f64 = 2e-4;
+/// Pictures differ from this on, dB.
+const WORSE_DB: f64 = 0.1;
+
+/// A row that the plan chose, and one that is faster and better.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Violation {
+    /// The case.
+    pub case: String,
+    /// The plan's own row.
+    pub row: String,
+    /// The row that dominates it.
+    pub better: String,
+    /// Time of the first over the second, median of the rounds.
+    pub time_ratio: f64,
+    /// RMS of the source coordinates, first and second, px.
+    pub coord_rms_px: [f64; 2],
+    /// PSNR, first and second, dB.
+    pub psnr_db: [Option<f64>; 2],
+}
+
+/// Marks the rows that no other row of their case and size beats in both time and error: `coord_front` by the RMS of the source
+/// coordinates, `image_front` by PSNR.
+pub fn mark_fronts(rows: &mut [Row]) {
+    let fronts: Vec<[bool; 2]> = rows
+        .iter()
+        .map(|row| {
+            let free = |error: fn(&Row) -> Option<f64>| {
+                error(row).is_some_and(|own| {
+                    !rows.iter().any(|other| {
+                        comparable(row, other)
+                            && other.ms_per_frame_p50 <= row.ms_per_frame_p50
+                            && error(other).is_some_and(|error| {
+                                error < own || (error <= own && other.ms_per_frame_p50 < row.ms_per_frame_p50)
+                            })
+                    })
+                })
+            };
+            [free(|row| row.coord_rms_px), free(|row| row.psnr_db.map(|db| -db))]
+        })
+        .collect();
+    for (row, [coord, image]) in rows.iter_mut().zip(fronts) {
+        row.coord_front = coord;
+        row.image_front = image;
+    }
+}
+
+fn comparable(a: &Row, b: &Row) -> bool {
+    a.case == b.case && [a.width, a.height] == [b.width, b.height]
+}
+
+/// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger coordinate error and no
+/// better picture.
+#[must_use]
+pub fn violations(rows: &[Row]) -> Vec<Violation> {
+    let mut found = Vec::new();
+    for row in rows.iter().filter(|row| row.family == Family::Tolerance) {
+        for other in rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob) {
+            let (Some(own_px), Some(other_px)) = (row.coord_rms_px, other.coord_rms_px) else { continue };
+            let [low, median, _] = row.times.ratio_to(&other.times);
+            let worse_picture = match (row.psnr_db, other.psnr_db) {
+                (Some(own), Some(other)) => own <= other + WORSE_DB,
+                _ => true,
+            };
+            if low > SLOWER && own_px > WORSE * other_px + FLOOR_PX && worse_picture {
+                found.push(Violation {
+                    case: row.case.clone(),
+                    row: row.knob.clone(),
+                    better: other.knob.clone(),
+                    time_ratio: median,
+                    coord_rms_px: [own_px, other_px],
+                    psnr_db: [row.psnr_db, other.psnr_db],
+                });
+            }
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::rounds::Times;
+
+    fn row(knob: &str, family: Family, wall_ms: [f64; 3], coord_rms_px: f64, psnr_db: f64) -> Row {
+        Row {
+            knob: knob.into(),
+            family,
+            ms_per_frame_p50: crate::timing::quantile(&wall_ms, 0.5),
+            coord_rms_px: Some(coord_rms_px),
+            psnr_db: Some(psnr_db),
+            times: Times { wall_ms: wall_ms.to_vec(), ..Times::default() },
+            ..Row::empty("case", [640, 480])
+        }
+    }
+
+    #[test]
+    fn dominated_rows_are_found_and_noise_is_not() {
+        let auto = row("auto", Family::Tolerance, [20.0, 22.0, 21.0], 0.05, 45.0);
+        let names = |rows: &[Row]| violations(rows).into_iter().map(|v| v.better).collect::<Vec<_>>();
+        let better = row("better", Family::Solver, [10.0, 11.0, 10.0], 0.01, 45.0);
+        assert_eq!(names(&[auto.clone(), better.clone()]), ["better"]);
+        // One row's time is noise, another's error is larger, a third's picture is worse; a forced row may be as bad as it likes.
+        let noisy = row("noisy", Family::Solver, [19.0, 23.0, 21.5], 0.01, 45.0);
+        let coarse = row("coarse", Family::Solver, [10.0, 11.0, 10.0], 0.06, 45.0);
+        let ugly = row("ugly", Family::Solver, [10.0, 11.0, 10.0], 0.01, 40.0);
+        assert!(names(&[auto.clone(), noisy, coarse, ugly]).is_empty());
+        assert!(names(&[row("forced", Family::Solver, [20.0, 22.0, 21.0], 0.05, 45.0), better.clone()]).is_empty());
+        let mut larger = better.clone();
+        larger.width = 1280;
+        assert!(names(&[auto, larger]).is_empty());
+    }
+
+    #[test]
+    fn a_front_has_no_row_that_another_beats() {
+        let mut rows = vec![
+            row("fast", Family::Solver, [5.0; 3], 1.0, 30.0),
+            row("middle", Family::Solver, [10.0; 3], 0.1, 29.0),
+            row("beaten", Family::Solver, [12.0; 3], 0.2, 28.0),
+            row("exact", Family::Solver, [20.0; 3], 0.001, 50.0),
+        ];
+        mark_fronts(&mut rows);
+        assert_eq!(rows.iter().map(|r| r.coord_front).collect::<Vec<_>>(), [true, true, false, true]);
+        assert_eq!(rows.iter().map(|r| r.image_front).collect::<Vec<_>>(), [true, false, false, true]);
+    }
+}

@@ -1,0 +1,304 @@
+//! The report as Markdown, CSV and plot.
+
+use std::fmt::Write as _;
+
+use super::{BenchError, Report, Row, knobs::DEFAULT};
+use crate::{
+    cases::Group,
+    plot::{Plot, Series},
+    timing::quantile,
+};
+
+/// Blender Cycles on two cores, the plane of 640x480 with 33 ms readout and 8 ms exposure: seconds a frame, dB. Measured once, outside of camsim.
+const CYCLES: [(f64, f64); 3] = [(0.6, 42.0), (2.3, 48.0), (8.9, 54.0)];
+/// The case that they stand beside.
+const CYCLES_CASE: &str = "blender-plane";
+
+impl Report {
+    /// The tables, ready to paste into docs/ACCURACY.md.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = String::new();
+        self.write_markdown(&mut text).unwrap_or_default();
+        text
+    }
+
+    fn write_markdown(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "camsim {}, {}, {} processor threads. `camsim bench{}`, {:.0} s.", self.version, self.adapter, self.cpu_threads, if self.quick { " --quick" } else { "" }, self.elapsed_s)?;
+        for rows in self.rows.chunk_by(|a, b| a.case == b.case) {
+            self.case(text, rows)?;
+        }
+        if !self.ablation.is_empty() {
+            self.ablation(text)?;
+        }
+        self.checks(text)?;
+        if !self.refused.is_empty() {
+            writeln!(text, "\nNot rendered by this version:\n")?;
+            let mut reasons: Vec<(&str, &str)> = self.refused.iter().map(|refused| (refused.knob.as_str(), refused.reason.as_str())).collect();
+            reasons.sort_unstable();
+            reasons.dedup();
+            for (knob, reason) in reasons {
+                writeln!(text, "- {knob}: {reason}")?;
+            }
+        }
+        Ok(())
+    }
+
+    fn case(&self, text: &mut String, rows: &[Row]) -> std::fmt::Result {
+        let Some(first) = rows.first() else { return Ok(()) };
+        let about = self.about.get(&first.case).copied().unwrap_or_default();
+        writeln!(text, "\n### {}: {about}\n", first.case)?;
+        let [coords, picture] = first.compared;
+        write!(text, "{}x{}, {} rounds; errors over {coords} coordinates and {picture} pixels of the picture", first.width, first.height, first.rounds)?;
+        match first.edge_share.filter(|share| *share > 0.0) {
+            Some(share) => writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?,
+            None => writeln!(text, ".\n")?,
+        }
+        writeln!(text, "| method | ms a frame | p99 | processor ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |")?;
+        writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|---|---|")?;
+        for row in rows {
+            let front = match (row.coord_front, row.image_front) {
+                (true, true) => "both",
+                (true, false) => "coordinates",
+                (false, true) => "picture",
+                _ => "",
+            };
+            writeln!(
+                text,
+                "| {} | {:.1} | {:.1} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {front} |",
+                row.knob,
+                row.ms_per_frame_p50,
+                row.ms_per_frame_p99,
+                decimal(row.cpu_ms_per_frame),
+                row.time_to_default.map_or("-".into(), |[_, median, _]| format!("{median:.2}")),
+                pixels(row.coord_rms_px),
+                pixels(row.coord_p99_px),
+                pixels(row.coord_max_px),
+                pixels(row.smooth_p99_px),
+                pixels(row.predicted_px),
+                decimal(row.psnr_db),
+                decimal(row.edge_psnr_db),
+            )?;
+        }
+        for (seconds, db) in CYCLES.iter().filter(|_| first.case == CYCLES_CASE && !self.quick) {
+            writeln!(text, "| Blender Cycles, two cores | {:.0} | | | | | | | | | {db:.0} | | |", 1e3 * seconds)?;
+        }
+        let worst = |of: fn(&Row) -> u64| rows.iter().filter(|row| of(row) > 0).max_by_key(|row| of(row));
+        if let Some(row) = worst(|row| row.falsely_valid) {
+            writeln!(text, "\nMost pixels with a source that the oracle has none for: {} ({}).", row.falsely_valid, row.knob)?;
+        }
+        if let Some(row) = worst(|row| row.missing) {
+            writeln!(text, "\nMost pixels without a source that the oracle has one for: {} ({}).", row.missing, row.knob)?;
+        }
+        Ok(())
+    }
+
+    fn ablation(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n### What each effect costs (case all-effects)\n")?;
+        writeln!(text, "| without | ms a frame | to the whole camera, ms (quartiles) | processor ms |")?;
+        writeln!(text, "|---|---|---|---|")?;
+        for row in &self.ablation {
+            let difference = row.to_full_ms.map_or("-".into(), |[low, median, high]| format!("{median:+.1} ({low:+.1} .. {high:+.1})"));
+            writeln!(text, "| {} | {:.1} | {difference} | {} |", row.without, row.ms_per_frame_p50, decimal(row.cpu_ms_per_frame))?;
+        }
+        Ok(())
+    }
+
+    fn checks(&self, text: &mut String) -> std::fmt::Result {
+        writeln!(text, "\n### No point spends more time for more error\n")?;
+        if self.violations.is_empty() {
+            writeln!(text, "Of the rows that the plan chose, none is beaten by another row of its case in both time and error.")?;
+        }
+        for violation in &self.violations {
+            let [own, better] = violation.coord_rms_px;
+            writeln!(
+                text,
+                "- {}: {} takes {:.2} times the time of {} for {} px RMS against {}",
+                violation.case,
+                violation.row,
+                violation.time_ratio,
+                violation.better,
+                pixels(Some(own)),
+                pixels(Some(better)),
+            )?;
+        }
+        writeln!(text, "\n### What was promised\n\n| promise | measured | kept |\n|---|---|---|")?;
+        for promise in self.promises() {
+            writeln!(text, "| {} | {} | {} |", promise.what, promise.measured, if promise.kept { "yes" } else { "no" })?;
+        }
+        Ok(())
+    }
+
+    fn row(&self, case: &str, knob: &str) -> Option<&Row> {
+        self.rows.iter().find(|row| row.case == case && row.knob == knob)
+    }
+
+    /// Rows of a kind of case.
+    fn rows_of(&self, groups: &[Group], knob: &str) -> impl Iterator<Item = &Row> {
+        let names: Vec<_> = groups.iter().map(|group| group.name()).collect();
+        self.rows.iter().filter(move |row| row.knob == knob && names.contains(&row.group))
+    }
+
+    fn promises(&self) -> Vec<Promise> {
+        let mut promises = Vec::new();
+        let mut worst = |what: &str, limit: f64, below: bool, unit: &str, values: Vec<(&Row, f64)>| {
+            let order = |a: &&(&Row, f64), b: &&(&Row, f64)| if below { a.1.total_cmp(&b.1) } else { b.1.total_cmp(&a.1) };
+            if let Some((row, value)) = values.iter().max_by(order) {
+                let kept = if below { *value <= limit } else { *value >= limit };
+                promises.push(Promise { what: what.into(), measured: format!("{}{unit} ({})", short(*value), row.case), kept });
+            }
+        };
+        let tight = "auto 0.001 px";
+        let of = |groups: &[Group], knob: &str, value: &dyn Fn(&Row) -> Option<f64>| {
+            self.rows_of(groups, knob).filter_map(|row| Some((row, value(row)?))).collect::<Vec<_>>()
+        };
+        use Group::{AllEffects, Buildings, Exposure, Lens, LongWindow, Smooth, Vibration};
+        worst("tolerance 0.001 px on smooth scenes: at most 0.001 px RMS", 1e-3, true, " px", of(&[Smooth], tight, &|row| row.coord_rms_px));
+        let to_rk2 = |row: &Row| {
+            let rk2 = self.row(&row.case, "rk2")?;
+            Some(row.times.ratio_to(&rk2.times)[1])
+        };
+        worst("the same at no more than 1.5 times the time of rk2", 1.5, true, " times", of(&[Smooth], tight, &to_rk2));
+        worst("tolerance 0.001 px with buildings: at most 0.05 px RMS", 0.05, true, " px", of(&[Buildings], tight, &|row| row.coord_rms_px));
+        let every = [Smooth, Vibration, Buildings, LongWindow, Exposure, Lens, AllEffects];
+        worst("default: p99 away from silhouettes at most 0.05 px", 0.05, true, " px", of(&every, DEFAULT, &|row| row.smooth_p99_px));
+        let over = |row: &Row| Some(row.smooth_p99_px? / row.predicted_px?);
+        let all: Vec<_> = self.rows.iter().filter_map(|row| Some((row, over(row)?))).collect();
+        worst("measured p99 over the predicted bound: at most 1", 1.0, true, "", all);
+        worst("all effects: at least 45 dB", 45.0, false, " dB", of(&[AllEffects], DEFAULT, &|row| row.psnr_db));
+        worst("all effects: at least 40 dB within 3 px of silhouettes", 40.0, false, " dB", of(&[AllEffects], "silhouettes: 16 samples", &|row| row.edge_psnr_db));
+        self.ablation_promises(&mut promises);
+        promises
+    }
+
+    fn ablation_promises(&self, promises: &mut Vec<Promise>) {
+        let Some((full, rest)) = self.ablation.split_first() else { return };
+        let single = &rest[..rest.len().min(super::ablation::EFFECTS.len())];
+        // The upper quartile, so that noise about zero does not count as time lost.
+        let dearer: Vec<_> = single.iter().filter(|row| row.to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full.ms_per_frame_p50)).collect();
+        let names = dearer.iter().map(|row| row.without.as_str()).collect::<Vec<_>>().join(", ");
+        let measured = if dearer.is_empty() { "each does".to_owned() } else { format!("more without {names}") };
+        promises.push(Promise { what: "a frame takes less time without an effect".into(), measured, kept: dearer.is_empty() });
+    }
+
+    /// The rows as comma-separated values, one line each after a header.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        let mut text = String::from(
+            "case,preset,width,height,ms_per_frame_p50,ms_per_frame_p99,cpu_ms_per_frame,coord_rms_px,coord_p99_px,coord_max_px,psnr_db,predicted_px,knob,group,edge_psnr_db,smooth_rms_px,smooth_p99_px,edge_share,falsely_valid,missing,coord_front,image_front,rounds\n",
+        );
+        let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
+        for row in &self.rows {
+            let cells = [
+                row.case.clone(),
+                row.preset.to_owned(),
+                row.width.to_string(),
+                row.height.to_string(),
+                number(Some(row.ms_per_frame_p50)),
+                number(Some(row.ms_per_frame_p99)),
+                number(row.cpu_ms_per_frame),
+                number(row.coord_rms_px),
+                number(row.coord_p99_px),
+                number(row.coord_max_px),
+                number(row.psnr_db),
+                number(row.predicted_px),
+                format!("\"{}\"", row.knob),
+                row.group.to_owned(),
+                number(row.edge_psnr_db),
+                number(row.smooth_rms_px),
+                number(row.smooth_p99_px),
+                number(row.edge_share),
+                row.falsely_valid.to_string(),
+                row.missing.to_string(),
+                row.coord_front.to_string(),
+                row.image_front.to_string(),
+                row.rounds.to_string(),
+            ];
+            text.push_str(&cells.join(","));
+            text.push('\n');
+        }
+        text
+    }
+
+    /// RMS of the source coordinates against time, both logarithmic: for each kind of case a curve through its methods, each a geometric mean
+    /// over the cases of that kind that have it; the paper's preset stands alone.
+    ///
+    /// # Errors
+    /// Nothing was measured.
+    pub fn plot(&self) -> Result<String, BenchError> {
+        let mut series = Vec::new();
+        let mut paper = Vec::new();
+        let mut groups: Vec<&str> = self.rows.iter().map(|row| row.group).collect();
+        groups.dedup();
+        for group in groups {
+            let rows: Vec<&Row> = self.rows.iter().filter(|row| row.group == group).collect();
+            let cases = rows.chunk_by(|a, b| a.case == b.case).count();
+            let mut knobs: Vec<&str> = Vec::new();
+            for row in &rows {
+                if !knobs.contains(&row.knob.as_str()) {
+                    knobs.push(&row.knob);
+                }
+            }
+            let mut points = Vec::new();
+            for knob in knobs {
+                let of_knob: Vec<(f64, f64)> =
+                    rows.iter().filter(|row| row.knob == knob).filter_map(|row| Some((row.ms_per_frame_p50, row.coord_rms_px?))).collect();
+                // Means over different sets of cases would not be comparable.
+                if of_knob.len() == cases {
+                    let mean = |value: fn(&(f64, f64)) -> f64| (of_knob.iter().map(|p| value(p).max(1e-9).ln()).sum::<f64>() / cases as f64).exp();
+                    let point = (mean(|p| p.0), mean(|p| p.1));
+                    if knob == "paper" { paper.push(point) } else { points.push(point) }
+                }
+            }
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            series.push(Series { name: group.to_owned(), points, joined: true });
+        }
+        series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
+        let plot = Plot {
+            title: format!("Error against time, {}", self.adapter),
+            x_label: "ms a frame (median)".into(),
+            y_label: "RMS of the source coordinates, px".into(),
+            log: [true, true],
+            series,
+        };
+        Ok(plot.svg()?)
+    }
+
+    /// A few lines about the whole.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let starts: Vec<f64> = self.rows.iter().map(|row| row.start_s).collect();
+        format!(
+            "{} rows of {} cases in {:.0} s; opening a session takes {:.1} s (median); {} rows are dominated",
+            self.rows.len(),
+            self.about.len(),
+            self.elapsed_s,
+            quantile(&starts, 0.5),
+            self.violations.len()
+        )
+    }
+}
+
+/// Something that camsim promises, and what this run says about it.
+struct Promise {
+    what: String,
+    measured: String,
+    kept: bool,
+}
+
+fn decimal(value: Option<f64>) -> String {
+    value.map_or("-".into(), |value| format!("{value:.1}"))
+}
+
+/// Two digits, whatever the size.
+fn short(value: f64) -> String {
+    match value.abs() {
+        size if size >= 10.0 => format!("{value:.1}"),
+        size if size >= 0.01 || size == 0.0 => format!("{value:.3}"),
+        _ => format!("{value:.1e}"),
+    }
+}
+
+fn pixels(value: Option<f64>) -> String {
+    value.map_or("-".into(), short)
+}

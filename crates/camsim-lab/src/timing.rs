@@ -1,0 +1,66 @@
+//! Clock and processor time, and what is said about a set of such times.
+
+use std::time::Duration;
+
+/// Milliseconds.
+#[must_use]
+pub fn ms(duration: Duration) -> f64 {
+    1e3 * duration.as_secs_f64()
+}
+
+/// Time that the threads of this program have had a processor, milliseconds (`/proc/self/task/*/schedstat`, first field: nanoseconds).
+/// With a software adapter that is the work itself, whatever else runs on the machine. `None` where there is no such file.
+#[must_use]
+pub fn processor_ms() -> Option<f64> {
+    let mut sum_ns = 0.0;
+    for task in std::fs::read_dir("/proc/self/task").ok()? {
+        // A thread may end while the folder is read.
+        let Ok(line) = std::fs::read_to_string(task.ok()?.path().join("schedstat")) else { continue };
+        sum_ns += line.split_whitespace().next()?.parse::<f64>().ok()?;
+    }
+    Some(1e-6 * sum_ns)
+}
+
+/// The value below which `part` of the values lie, 0..=1, linear between neighbours; NaN without values.
+#[must_use]
+pub fn quantile(values: &[f64], part: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = part.clamp(0.0, 1.0) * (sorted.len().saturating_sub(1)) as f64;
+    let (below, rest) = (place.floor() as usize, place.fract());
+    let value = |i: usize| sorted.get(i).or(sorted.last()).copied().unwrap_or(f64::NAN);
+    value(below) + rest * (value(below + 1) - value(below))
+}
+
+/// Lower quartile, median, upper quartile.
+#[must_use]
+pub fn quartiles(values: &[f64]) -> [f64; 3] {
+    [0.25, 0.5, 0.75].map(|part| quantile(values, part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_lie_between_their_neighbours() {
+        assert_eq!(quartiles(&[4.0, 1.0, 3.0, 2.0, 5.0]), [2.0, 3.0, 4.0]);
+        assert_eq!(quartiles(&[1.0, 2.0]), [1.25, 1.5, 1.75]);
+        assert_eq!(quantile(&[7.0], 0.99), 7.0);
+        assert!(quantile(&[], 0.5).is_nan());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn work_shows_in_processor_time() {
+        let before = processor_ms().expect("schedstat");
+        let begin = std::time::Instant::now();
+        let mut sum = 0.0_f64;
+        while begin.elapsed() < Duration::from_millis(60) {
+            sum += std::hint::black_box(sum).sin();
+        }
+        let used = processor_ms().expect("schedstat") - before;
+        // Other tests of this binary may run at the same time, and another process may have had this processor.
+        assert!(used > 5.0, "{used}");
+    }
+}
