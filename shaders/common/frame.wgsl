@@ -40,7 +40,8 @@ struct Frame {
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,
-    pad0: u32,
+    // Largest rotation of a step of the rk2 solver.
+    rk2_step_rad: f32,
     pad1: u32,
     pad2: u32,
     // Key camera in the world, for coords: NED position and the columns of ned_from_key.
@@ -48,6 +49,10 @@ struct Frame {
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
     ned_from_key_z: vec4<f32>,
+    // The key camera's motion in its own axes, for the solvers that take it as constant: velocity of the optical centre; angular rate, and
+    // its length in w.
+    key_velocity_m_s: vec4<f32>,
+    key_rate_rad_s: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -17,19 +17,20 @@ use crate::{
     scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
-    temporal::IdealGeometry,
+    temporal::{IdealGeometry, displacement::Twist},
 };
 
 mod bounds;
 mod describe;
 mod edges;
+mod forced;
 mod lines;
 mod motion;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
-pub use lines::{LinePoses, line_poses, row_records};
+pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
@@ -87,6 +88,10 @@ pub enum TemporalStage {
         /// Depth look-ups.
         iterations: u32,
     },
+    /// One straight step at constant twist and depth (eq. 16).
+    Linear,
+    /// Heun's steps of at most 2.5 deg at constant twist and depth (eq. 18).
+    Rk2,
 }
 
 /// Motion blur.
@@ -151,6 +156,8 @@ pub struct FramePlan {
     pub key_s: f64,
     /// Its pose.
     pub key_pose: CameraPose,
+    /// The camera's motion then, in its own axes: all that the constant-twist solvers know of it.
+    pub key_twist: Twist,
     /// Its pixels.
     pub ideal: IdealGeometry,
     /// Lens inverse.
@@ -253,17 +260,24 @@ impl Planner {
         let quality = &self.sequence.scenario.quality;
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
-        let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene);
+        let key_pose = path.pose(key_s);
+        let key_twist = Twist {
+            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
+            rate_rad_s: path.rate_camera(key_s),
+        };
+        let demanded = forced::temporal_stage(quality);
+        let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene, demanded.map(|stage| (stage, key_twist)));
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
-        let key_pose = path.pose(key_s);
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = ray_stage(&reach, &mut skipped);
-        let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
+        let temporal = demanded
+            .unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+        let blur = forced::blur_stage(temporal, blur, quality, &motion);
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
         self.note_static_skips(&mut skipped, temporal);
@@ -277,6 +291,7 @@ impl Planner {
             shutter: self.shutter,
             key_s,
             key_pose,
+            key_twist,
             ideal,
             ray,
             temporal,
@@ -301,7 +316,7 @@ impl Planner {
         }
         if !self.truth {
             skip("depth and coordinates", "neither is among the output channels");
-            if !matches!(temporal, TemporalStage::Reproject { .. }) {
+            if matches!(temporal, TemporalStage::Identity | TemporalStage::Rotation) {
                 skip("depth read by the reverse pipeline", "no stage of this frame uses it");
             }
         }

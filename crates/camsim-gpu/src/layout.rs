@@ -32,13 +32,15 @@ pub struct FrameUniforms {
     pub exposure_travel_px_m: f32,
     pub edge_scale: u32,
     pub edge_samples: u32,
-    pub pad0: u32,
+    pub rk2_step_rad: f32,
     pub pad1: u32,
     pub pad2: u32,
     pub key_position_ned_m: [f32; 4],
     pub ned_from_key_x: [f32; 4],
     pub ned_from_key_y: [f32; 4],
     pub ned_from_key_z: [f32; 4],
+    pub key_velocity_m_s: [f32; 4],
+    pub key_rate_rad_s: [f32; 4],
 }
 
 /// Mirror of `IdealCamera` in shaders/ideal/surface.wgsl.
@@ -141,13 +143,15 @@ mod tests {
                 exposure_travel_px_m,
                 edge_scale,
                 edge_samples,
-                pad0,
+                rk2_step_rad,
                 pad1,
                 pad2,
                 key_position_ned_m,
                 ned_from_key_x,
                 ned_from_key_y,
                 ned_from_key_z,
+                key_velocity_m_s,
+                key_rate_rad_s,
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);

@@ -15,9 +15,34 @@ pub struct LinePoses {
     pub stride: u32,
 }
 
+/// Times of a frame's lines after its key instant, seconds, ordered as the poses of [`LinePoses`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineTimes {
+    /// Seconds.
+    pub dt_s: Vec<f32>,
+    /// Entries a line.
+    pub stride: u32,
+}
+
 /// The pose table of a frame.
 #[must_use]
 pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
+    let (entries, stride) = of_instants(plan, |t_s| {
+        let (rotation, shift) = path.pose(t_s).relative_to(&plan.key_pose);
+        rows_of(rotation, shift)
+    });
+    LinePoses { entries, stride }
+}
+
+/// The time table of a frame, for the solvers that take the motion as constant. Differences are taken in f64.
+#[must_use]
+pub fn line_times(plan: &FramePlan) -> LineTimes {
+    let (dt_s, stride) = of_instants(plan, |t_s| (t_s - plan.key_s) as f32);
+    LineTimes { dt_s, stride }
+}
+
+/// An entry for every `[field][line][node]` and the entries a line.
+fn of_instants<T>(plan: &FramePlan, entry: impl Fn(f64) -> T) -> (Vec<T>, u32) {
     let (_, lines, fields) = table_shape(&plan.shutter);
     let nodes = plan.blur.map_or(1, |blur| blur.nodes);
     let stride = if nodes == 1 { 1 } else { nodes + 1 };
@@ -25,19 +50,16 @@ pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
     for field in 0..fields {
         for line in 0..lines {
             let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
-            let mut push = |t_s: f64| {
-                let (rotation, shift) = path.pose(t_s).relative_to(&plan.key_pose);
-                entries.push(rows_of(rotation, shift));
-            };
             if nodes > 1 {
-                for node in 0..nodes {
-                    push(mid_s + plan.shutter.exposure_s() * (f64::from(node) / f64::from(nodes - 1) - 0.5));
-                }
+                entries.extend((0..nodes).map(|node| {
+                    let along = f64::from(node) / f64::from(nodes - 1) - 0.5;
+                    entry(mid_s + plan.shutter.exposure_s() * along)
+                }));
             }
-            push(mid_s);
+            entries.push(entry(mid_s));
         }
     }
-    LinePoses { entries, stride }
+    (entries, stride)
 }
 
 /// Time shift of a line of a field: with sideways readout the fields are the even and the odd rows.
