@@ -2,3 +2,5 @@
 
 pub mod cases;
 pub mod plot;
+
+pub mod reproduce;

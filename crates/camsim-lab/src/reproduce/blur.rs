@@ -1,6 +1,6 @@
 //! 8.5: motion blur in rotation (fig. 16) and in translation (fig. 17).
 
-use camsim_core::{frame::RenderedFrame, scenario::ShutterSpec};
+use camsim_core::{frame::RenderedFrame, reference::RenderOptions, scenario::ShutterSpec};
 
 use super::{
     Picture, Report, ReproduceError, Setup, Table,
@@ -13,8 +13,9 @@ use crate::plot::{Plot, Series};
 const EXPOSURE_S: f64 = 2.0;
 /// Samples of the paper's figures.
 const SAMPLES: [u32; 3] = [3, 10, 100];
-/// Instants whose mean stands for the exposure: 0.4 deg of the turn apart.
-const INSTANTS: u32 = 180;
+/// Samples of a pixel by which the oracle integrates area and exposure, at most, and where it stops, 1/255 of the linear range.
+const ORACLE_SAMPLES: u32 = 512;
+const ORACLE_DN: f64 = 0.5;
 
 /// What a perfect camera sees at `count` instants of the exposure; `phase(i)` from -0.5 to 0.5.
 fn snapshots(
@@ -34,9 +35,8 @@ fn end_to_end(count: u32) -> impl Fn(u32) -> f64 {
 pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let mut report = Report::default();
     report.notes.push(format!(
-        "Bench as in 8.4; exposure {EXPOSURE_S} s about the stamp, so that three samples are one second apart. \"Exact\" is the mean of {INSTANTS} pictures \
-         of a perfect camera at instants in the middle of equal parts of the exposure; \"overlay\" the mean of as many pictures as the method takes samples, \
-         at its own instants. PSNR on linear light, peak 1; the paper averages stored values, which the last rows of each table do."
+        "Bench as in 8.4; exposure {EXPOSURE_S} s about the stamp, so that three samples are one second apart. \"Exact\" is the oracle's integral over pixel \
+         area and exposure, to {ORACLE_DN}/255; \"overlay\" the mean of as many perfect pictures as the method takes samples, at its own instants. PSNR on linear light, peak 1; the paper averages stored values, which the last rows of each table do."
     ));
     let turning = case(setup, &mut report, ("fig16", "Fig. 16: rotation"), Motion::turning())?;
     let flying = case(setup, &mut report, ("fig17", "Fig. 17: translation to the right"), Motion::flying(1.0, 0.0))?;
@@ -63,9 +63,9 @@ type Curves = [Vec<(f64, f64)>; 2];
 fn case(setup: &Setup<'_>, report: &mut Report, (name, title): (&'static str, &str), motion: Motion) -> Result<Curves, ReproduceError> {
     let scene = rig::target(setup, TARGET_M)?;
     let bench = rig::sequence(rig::pinhole(setup.width_px), motion, &scene)?;
-    let instants = INSTANTS.min(setup.width_px / 4);
-    let exact = rig::mean(&snapshots(setup, &bench, instants, |i| (f64::from(i) + 0.5) / f64::from(instants) - 0.5)?);
     let exposed = rig::at(&bench, 0.0, ShutterSpec { exposure_ms: 1e3 * EXPOSURE_S, ..ShutterSpec::default() });
+    let options = RenderOptions { max_samples: ORACLE_SAMPLES, tolerance_dn: ORACLE_DN, ..RenderOptions::default() };
+    let exact = rig::oracle(&exposed)?.render(0, &options);
     let ideal = Ideal::at(setup.engine, &bench, 0.0)?;
     let spec = &exposed.scenario.camera;
     let rk2 = Model::Rk2(2.5_f64.to_radians());
@@ -101,7 +101,6 @@ fn case(setup: &Setup<'_>, report: &mut Report, (name, title): (&'static str, &s
     frames.push(overlay);
     frames.extend(shown);
     frames.extend([stored, own, exact]);
-    // Three a row: the last place stays empty.
     report.pictures.push(Picture {
         name,
         caption: format!(

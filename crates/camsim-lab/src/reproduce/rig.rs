@@ -175,7 +175,22 @@ pub fn render(
     channels: &[Channel],
     frames: impl IntoIterator<Item = u64>,
 ) -> Result<Vec<Finished>, ReproduceError> {
+    render_at_phase(engine, sequence, channels, frames, 0.0)
+}
+
+/// As [`render`], with source coordinates reported at `phase` of the exposure, -0.5 to 0.5.
+///
+/// # Errors
+/// As [`render`].
+pub fn render_at_phase(
+    engine: &Engine,
+    sequence: &Arc<Sequence>,
+    channels: &[Channel],
+    frames: impl IntoIterator<Item = u64>,
+    phase: f32,
+) -> Result<Vec<Finished>, ReproduceError> {
     let mut session = engine.session::<Infallible>(sequence.clone(), channels)?;
+    session.set_coords_phase(phase);
     let mut done = Vec::new();
     session.render::<Infallible>(frames, &mut |finished| {
         done.push(finished);
@@ -230,18 +245,27 @@ pub fn difference(a: &RenderedFrame, b: &RenderedFrame) -> Result<Comparison, Re
     compare(view(a), view(b)).map_err(|error| ReproduceError::made("the pair of pictures", error))
 }
 
+/// The oracle of a sequence.
+///
+/// # Errors
+/// A camera or shutter that cannot be used.
+pub fn oracle(sequence: &Arc<Sequence>) -> Result<Oracle, ReproduceError> {
+    Oracle::new(sequence.clone()).map_err(|error| ReproduceError::made("the camera", error))
+}
+
 /// Pixels of frame 0 that show the target where the oracle's ray through their centre meets nothing, or the sky where it meets the target.
 ///
 /// # Errors
 /// A camera that cannot be used.
 pub fn wrong_surface(sequence: &Arc<Sequence>, frame: &RenderedFrame) -> Result<usize, ReproduceError> {
-    let oracle = Oracle::new(sequence.clone()).map_err(|error| ReproduceError::made("the camera", error))?;
+    let oracle = oracle(sequence)?;
     let [width, _] = frame.size_px;
     // The sky is blue, the target has no hue: halfway between is a pixel that sees as much of both.
     let sky = |pixel: &[f32]| pixel[2] - pixel[0] > 0.5 * (SKY_LINEAR[2] - SKY_LINEAR[0]);
+    let view = oracle.view(0);
     let wrong = frame.color_rgba.par_chunks_exact(4).enumerate().filter(|(i, pixel)| {
         let at = [*i as u32 % width, *i as u32 / width];
-        let look = oracle.look(0, at, DVec2::ZERO, 0.0);
+        let look = view.look(at, DVec2::ZERO, 0.0);
         look.is_some_and(|look| pixel[3] > 0.0 && sky(pixel) == look.hit.is_some())
     });
     Ok(wrong.count())
