@@ -218,7 +218,7 @@ impl FrameView<'_> {
     /// Ideal ray (u, v) of a place.
     #[must_use]
     pub fn ray(&self, [x, y]: [u32; 2], offset_px: DVec2) -> Option<DVec2> {
-        let eye = match &self.eye {
+        let eye: &Eye = match &self.eye {
             FrameEye::Fixed(eye) => eye,
             FrameEye::Zoomed(eye) => eye,
             FrameEye::Blind => return None,
