@@ -8,5 +8,6 @@ pub mod explain;
 pub mod info;
 pub mod lens;
 pub mod render;
+pub mod reproduce;
 pub mod track;
 pub mod viewer;

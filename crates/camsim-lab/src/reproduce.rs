@@ -33,6 +33,8 @@ mod rig;
 mod shutter;
 mod speed;
 mod table;
+#[cfg(test)]
+mod tests;
 mod time;
 mod tracking;
 
