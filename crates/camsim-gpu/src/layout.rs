@@ -33,14 +33,15 @@ pub struct FrameUniforms {
     pub edge_scale: u32,
     pub edge_samples: u32,
     pub rk2_step_rad: f32,
-    pub pad1: u32,
-    pub pad2: u32,
+    pub lens_tangential: [f32; 2],
     pub key_position_ned_m: [f32; 4],
     pub ned_from_key_x: [f32; 4],
     pub ned_from_key_y: [f32; 4],
     pub ned_from_key_z: [f32; 4],
     pub key_velocity_m_s: [f32; 4],
     pub key_rate_rad_s: [f32; 4],
+    pub lens_radial: [f32; 4],
+    pub linear_fog: [f32; 4],
 }
 
 /// Mirror of `IdealCamera` in shaders/ideal/surface.wgsl.
@@ -144,14 +145,15 @@ mod tests {
                 edge_scale,
                 edge_samples,
                 rk2_step_rad,
-                pad1,
-                pad2,
+                lens_tangential,
                 key_position_ned_m,
                 ned_from_key_x,
                 ned_from_key_y,
                 ned_from_key_z,
                 key_velocity_m_s,
                 key_rate_rad_s,
+                lens_radial,
+                linear_fog,
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);

@@ -1,4 +1,6 @@
 // Picture, depth and coordinates.
+const EMITS_RAYS: bool = true;
+
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
 
 struct Truth {
