@@ -28,9 +28,21 @@ fn assets() -> PathBuf {
 fn help_names_every_command_and_every_exit_code() {
     let (code, out, err) = camsim(["--help"]);
     assert_eq!((code, err.as_str()), (0, ""));
-    for word in
-        ["demo", "render", "explain", "track", "lens", "camera", "compare", "reproduce", "info", "viewer", "completions", "Exit codes", "CAMSIM_ADAPTER"]
-    {
+    for word in [
+        "demo",
+        "render",
+        "explain",
+        "track",
+        "lens",
+        "camera",
+        "compare",
+        "reproduce",
+        "info",
+        "viewer",
+        "completions",
+        "Exit codes",
+        "CAMSIM_ADAPTER",
+    ] {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
     for command in ["demo", "render", "explain", "track", "lens", "camera", "compare", "reproduce", "info", "viewer", "completions"] {

@@ -11,11 +11,7 @@ use std::{
 
 use camsim_gpu::{Engine, GpuError, RenderError};
 use camsim_io::{
-    camera_file::CameraFileError,
-    flight_log::FlightLogError,
-    load::LoadError,
-    pictures::PictureError,
-    scenario_file::ScenarioError,
+    camera_file::CameraFileError, flight_log::FlightLogError, load::LoadError, pictures::PictureError, scenario_file::ScenarioError,
     write::WriteError,
 };
 
@@ -64,8 +60,7 @@ pub enum Experiment {
 
 impl Experiment {
     /// All, in the paper's order.
-    pub const ALL: [Self; 8] =
-        [Self::Tracking, Self::Lens, Self::Time, Self::Blur, Self::Shutter, Self::Interlace, Self::Map, Self::Speed];
+    pub const ALL: [Self; 8] = [Self::Tracking, Self::Lens, Self::Time, Self::Blur, Self::Shutter, Self::Interlace, Self::Map, Self::Speed];
 
     /// Its name on the command line and of its folder.
     #[must_use]

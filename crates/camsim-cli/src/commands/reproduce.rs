@@ -93,7 +93,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
     if data.is_none() {
-        console.note(format_args!("no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"));
+        console.note(format_args!(
+            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"
+        ));
     }
     let scratch = args.output.join("inputs");
     let setup = Setup { engine: &engine, data: data.as_deref(), scratch: &scratch, width_px: args.width };

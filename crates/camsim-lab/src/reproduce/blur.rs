@@ -41,8 +41,11 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let turning = case(setup, &mut report, ("fig16", "Fig. 16: rotation"), Motion::turning())?;
     let flying = case(setup, &mut report, ("fig17", "Fig. 17: translation to the right"), Motion::flying(1.0, 0.0))?;
     let series = [("rotation", turning), ("translation", flying)].into_iter().flat_map(|(name, [straight, curved])| {
-        [("straight line (paper)", straight), ("each sample at its own place", curved)]
-            .map(|(how, points)| Series { name: format!("{name}, {how}"), points, joined: true })
+        [("straight line (paper)", straight), ("each sample at its own place", curved)].map(|(how, points)| Series {
+            name: format!("{name}, {how}"),
+            points,
+            joined: true,
+        })
     });
     report.plots.push((
         "samples",

@@ -101,9 +101,8 @@ pub fn matches(seen: &[Seen], spots: &[Spot]) -> Matches {
     let mut matches = Matches::default();
     for circle in seen {
         let reach_px = 0.5 * (circle.area_px2 / std::f64::consts::PI).sqrt();
-        let fits = |spot: &&Spot| {
-            spot.centroid_px.distance(circle.centroid_px) < reach_px && (spot.area_px2 / circle.area_px2 - 1.0).abs() < 0.34
-        };
+        let fits =
+            |spot: &&Spot| spot.centroid_px.distance(circle.centroid_px) < reach_px && (spot.area_px2 / circle.area_px2 - 1.0).abs() < 0.34;
         let distance = |spot: &&Spot| spot.centroid_px.distance(circle.centroid_px);
         match spots.iter().filter(fits).min_by(|a, b| distance(a).total_cmp(&distance(b))) {
             Some(spot) => matches.pairs.push((*circle, *spot)),
@@ -148,7 +147,9 @@ mod tests {
         let found = spots(&frame);
         assert_eq!(found.len(), 2, "the one at the border does not count: {found:?}");
         for (spot, (centre, radius)) in found.iter().zip(discs) {
-            assert!(spot.centroid_px.distance(centre) < 2e-3 && (spot.area_px2 / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 2e-3);
+            assert!(
+                spot.centroid_px.distance(centre) < 2e-3 && (spot.area_px2 / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 2e-3
+            );
         }
         // A pixel without a ray in the rim spoils a spot.
         frame.color_rgba[4 * (15 * 64 + 27) + 3] = 0.0;

@@ -121,10 +121,17 @@ impl Ideal {
     ///
     /// # Errors
     /// A camera that cannot be used.
-    pub fn frame(&self, camera: &CameraSpec, model: Model, samples: u32, path: Path, light: Light) -> Result<RenderedFrame, ReproduceError> {
+    pub fn frame(
+        &self,
+        camera: &CameraSpec,
+        model: Model,
+        samples: u32,
+        path: Path,
+        light: Light,
+    ) -> Result<RenderedFrame, ReproduceError> {
         let lens = CameraModel::from_spec(camera).map_err(|error| ReproduceError::made("the camera", error))?;
-        let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)
-            .map_err(|error| ReproduceError::made("the shutter", error))?;
+        let shutter =
+            Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).map_err(|error| ReproduceError::made("the shutter", error))?;
         let [width, height] = camera.size_px;
         let pixel = |i: u32| {
             let [x, y] = [i % width, i / width];

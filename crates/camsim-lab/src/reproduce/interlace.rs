@@ -41,7 +41,10 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let step_rad = 2.5_f64.to_radians();
     let mut frames = vec![first, second];
     for (method, frame) in [
-        ("paper: linear, one step", ideal.frame(&interlaced.scenario.camera, Model::Linear(f64::INFINITY), 1, Path::Straight, Light::Linear)?),
+        (
+            "paper: linear, one step",
+            ideal.frame(&interlaced.scenario.camera, Model::Linear(f64::INFINITY), 1, Path::Straight, Light::Linear)?,
+        ),
         ("paper: RK2", ideal.frame(&interlaced.scenario.camera, Model::Rk2(step_rad), 1, Path::Straight, Light::Linear)?),
         ("camsim", own),
     ] {

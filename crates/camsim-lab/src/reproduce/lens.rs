@@ -116,7 +116,9 @@ pub(super) fn find(setup: &Setup<'_>, which: usize, count: u64) -> Result<Found,
         let stamp_s = finished.plan.stamp_s;
         let listed: Vec<Option<Seen>> = super::pattern::circles(TARGET_M)
             .iter()
-            .map(|circle| circle.seen(|point| rig::project(&sequence, &camera, &shutter, stamp_s, point)).filter(|seen| inside(seen, camera.size_px)))
+            .map(|circle| {
+                circle.seen(|point| rig::project(&sequence, &camera, &shutter, stamp_s, point)).filter(|seen| inside(seen, camera.size_px))
+            })
             .collect();
         let here = matches(&listed.iter().flatten().copied().collect::<Vec<_>>(), &spots(&finished.frame));
         found.missed += here.missed;
@@ -167,11 +169,22 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let found = [find(setup, 0, u64::MAX)?, find(setup, 1, u64::MAX)?];
     let mut table = Table::new(
         "Centres of the area of the circles, px",
-        &["calibration", "pictures", "circles", "missed", "RMS", "99 %", "largest", "centre of the circle instead, RMS", "picture without a ray"],
+        &[
+            "calibration",
+            "pictures",
+            "circles",
+            "missed",
+            "RMS",
+            "99 %",
+            "largest",
+            "centre of the circle instead, RMS",
+            "picture without a ray",
+        ],
     );
     let mut series = Vec::new();
     for (calibration, found) in calibrations(setup.width_px).iter().zip(&found) {
-        let camera = camsim_core::camera::CameraModel::from_spec(&calibration.camera).map_err(|error| ReproduceError::made("the camera", error))?;
+        let camera =
+            camsim_core::camera::CameraModel::from_spec(&calibration.camera).map_err(|error| ReproduceError::made("the camera", error))?;
         let stats = ErrorStats::of(found.errors_px());
         let naive = ErrorStats::of(found.pairs.iter().map(|(seen, spot)| seen.centre_px.distance(spot.centroid_px)).collect());
         table.row([
@@ -205,7 +218,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let first = |found: &Found| found.frames.first().cloned();
     report.pictures.push(Picture {
         name: "fig12",
-        caption: "Fig. 12: the first pose by (a) OpenCV's and (b) Agisoft Lens's calibration. Red: no ray of the lens arrives there.".into(),
+        caption: "Fig. 12: the first pose by (a) OpenCV's and (b) Agisoft Lens's calibration. Red: no ray of the lens arrives there."
+            .into(),
         frames: [first(&opencv), first(&agisoft)].into_iter().flatten().collect(),
         columns: 2,
         shrink: 1,
@@ -215,7 +229,13 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         ("poses-agisoft", "Every fifth pose with Agisoft Lens's calibration.", agisoft),
     ] {
         let step = found.frames.len().div_ceil(SHOWN).max(1);
-        report.pictures.push(Picture { name, caption: caption.into(), frames: found.frames.into_iter().step_by(step).collect(), columns: 4, shrink: 2 });
+        report.pictures.push(Picture {
+            name,
+            caption: caption.into(),
+            frames: found.frames.into_iter().step_by(step).collect(),
+            columns: 4,
+            shrink: 2,
+        });
     }
     Ok(report)
 }
@@ -230,9 +250,14 @@ fn between([opencv, agisoft]: &[Found; 2]) -> Table {
         .filter_map(|(a, b)| Some((*a)?.centroid_px.distance((*b)?.centroid_px)))
         .collect();
     let stats = ErrorStats::of(distances);
-    let mut table =
-        Table::new("Between the two calibrations of the same photographs, px", &["", "circles", "RMS", "99 %", "largest"]);
-    table.row(["OpenCV against Agisoft Lens".into(), stats.count.to_string(), short(stats.rms_px), short(stats.p99_px), short(stats.max_px)]);
+    let mut table = Table::new("Between the two calibrations of the same photographs, px", &["", "circles", "RMS", "99 %", "largest"]);
+    table.row([
+        "OpenCV against Agisoft Lens".into(),
+        stats.count.to_string(),
+        short(stats.rms_px),
+        short(stats.p99_px),
+        short(stats.max_px),
+    ]);
     table
 }
 

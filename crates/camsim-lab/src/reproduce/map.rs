@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{CoordErrors, ErrorStats, KeyFrame, coord_errors},
+    reference::{ErrorStats, KeyFrame, coord_errors},
     scenario::{CameraSpec, Channel, FieldOr, FlightSpec, Scenario, SceneSpec, ShutterSpec, TerrainSpec, TrackerSpec},
     sequence::Sequence,
 };
@@ -61,19 +61,8 @@ fn left_turn_s(sequence: &Sequence) -> f64 {
     instants.min_by(|a, b| rate(*a).total_cmp(&rate(*b))).unwrap_or(start_s)
 }
 
-/// Errors of one effect.
-pub(super) struct Effect {
-    /// Its name.
-    pub name: &'static str,
-    /// Of camsim, in pixels of its ideal frame.
-    pub own: CoordErrors,
-    /// Of the paper's RK2 from the frame of the stamp.
-    pub paper: ErrorStats,
-    /// Pixels compared of the paper's method that look outside of its ideal frame.
-    pub outside: usize,
-}
-
-/// The paper's method against the oracle at one phase of the exposure.
+/// The paper's RK2 from the frame of the stamp against the oracle at one phase of the exposure, in pixels of the ideal frame, and how many
+/// of the pixels looked at have their source outside of it.
 fn paper_errors(setup: &Setup<'_>, sequence: &Arc<Sequence>, phase: f64) -> Result<(ErrorStats, usize), ReproduceError> {
     let ideal = Ideal::at(setup.engine, sequence, sequence.start_s)?;
     let key = KeyFrame { pose: ideal.pose, ideal: ideal.geometry };
@@ -118,19 +107,29 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     ];
     let mut table = Table::new(
         "Source coordinates against the oracle, px",
-        &["effect", "paper: RMS", "99 %", "largest", "outside", "camsim: RMS", "99 %", "largest", "smooth: RMS", "silhouettes: RMS", "falsely valid", "missing"],
+        &[
+            "effect",
+            "paper: RMS",
+            "99 %",
+            "largest",
+            "outside",
+            "camsim: RMS",
+            "99 %",
+            "largest",
+            "smooth: RMS",
+            "silhouettes: RMS",
+            "falsely valid",
+            "missing",
+        ],
     );
     let mut frames = Vec::new();
     for (name, stamp_s, shutter, phase) in effects {
         let sequence = rig::at(&flight, stamp_s, shutter);
-        let Effect { own, paper, outside, .. } = {
-            let (paper, outside) = paper_errors(setup, &sequence, phase)?;
-            let finished = rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
-            let finished = finished.ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))?;
-            let own = coord_errors(&rig::oracle(&sequence)?, &finished.plan, &finished.frame, phase, STEP_PX).unwrap_or_default();
-            frames.push(finished.frame);
-            Effect { name, own, paper, outside }
-        };
+        let (paper, outside) = paper_errors(setup, &sequence, phase)?;
+        let finished = rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
+        let finished = finished.ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))?;
+        let own = coord_errors(&rig::oracle(&sequence)?, &finished.plan, &finished.frame, phase, STEP_PX).unwrap_or_default();
+        frames.push(finished.frame);
         table.row([
             name.into(),
             short(paper.rms_px),
@@ -149,7 +148,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let delayed = rig::difference(&frames[0], &frames[1])?;
     report.notes.push(format!(
         "Fig. 21 (a) and (b), \"visually indistinguishable\" in the paper: camsim's differ by {:.1e} RMS of the linear range, {} at most.",
-        delayed.rmse, short(delayed.max)
+        delayed.rmse,
+        short(delayed.max)
     ));
     report.tables.push(("fig21", table));
     report.pictures.push(Picture {

@@ -47,10 +47,7 @@ fn centres_px() -> impl Iterator<Item = DVec2> {
     (0..GRID[0]).flat_map(|column| {
         (0..GRID[1]).map(move |row| {
             let shift = if column % 2 == 0 { 0.0 } else { -SPACING_PX };
-            DVec2::new(
-                FIRST_PX[0] + SPACING_PX * f64::from(column),
-                FIRST_PX[1] + shift + 2.0 * SPACING_PX * f64::from(row),
-            )
+            DVec2::new(FIRST_PX[0] + SPACING_PX * f64::from(column), FIRST_PX[1] + shift + 2.0 * SPACING_PX * f64::from(row))
         })
     })
 }

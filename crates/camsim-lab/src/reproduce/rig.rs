@@ -301,8 +301,7 @@ pub fn project(sequence: &Sequence, camera: &CameraModel, shutter: &Shutter, sta
 pub fn checked(sequence: &Sequence) -> Result<(CameraModel, Shutter), ReproduceError> {
     let spec = &sequence.scenario.camera;
     let camera = CameraModel::from_spec(spec).map_err(|error| ReproduceError::made("the camera", error))?;
-    let shutter =
-        Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| ReproduceError::made("the shutter", error))?;
+    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| ReproduceError::made("the shutter", error))?;
     Ok((camera, shutter))
 }
 

@@ -20,8 +20,6 @@ const READOUT_S: f64 = 1.0;
 pub(super) struct Seen {
     /// Motion.
     pub motion: &'static str,
-    /// Method.
-    pub method: &'static str,
     /// Circles.
     pub circles: Matches,
     /// Pixels that show the wrong surface.
@@ -76,7 +74,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         let paper = ideal.frame(&bench.scenario.camera, Model::Rk2(2.5_f64.to_radians()), 1, Path::Straight, Light::Linear)?;
         let own = rig::picture(setup.engine, &bench)?;
         for (method, frame) in [("paper: RK2 from the frame of the stamp", &paper), ("camsim", &own)] {
-            let found = look(&bench, name, method, frame)?;
+            let found = look(&bench, name, frame)?;
             let stats = ErrorStats::of(found.circles.errors_px());
             table.row([
                 name.into(),
@@ -116,14 +114,9 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
 }
 
 /// Finds the circles of a frame of the bench.
-pub(super) fn look(
-    bench: &Arc<Sequence>,
-    motion: &'static str,
-    method: &'static str,
-    frame: &camsim_core::frame::RenderedFrame,
-) -> Result<Seen, ReproduceError> {
+pub(super) fn look(bench: &Arc<Sequence>, motion: &'static str, frame: &camsim_core::frame::RenderedFrame) -> Result<Seen, ReproduceError> {
     let circles = matches(&rig::seen_circles(bench, 0.0, TARGET_M)?, &spots(frame));
-    Ok(Seen { motion, method, circles, wrong: rig::wrong_surface(bench, frame)? })
+    Ok(Seen { motion, circles, wrong: rig::wrong_surface(bench, frame)? })
 }
 
 /// Shear or stretch of the grid against its closed form: with the image moving at `rate` px/s, `rows` rows and readout `t_r`, a point of
@@ -154,8 +147,8 @@ fn shape(bench: &Sequence, found: &Seen, table: &mut Table) -> Result<(), Reprod
         })
         .collect();
     let still: Vec<DVec2> = pairs.iter().map(|p| p.0).collect();
-    let [found_shape, true_shape] =
-        [pairs.iter().map(|p| p.1).collect::<Vec<_>>(), pairs.iter().map(|p| p.2).collect()].map(|moved| affine(&still, &moved)[k[0]][k[1]]);
+    let [found_shape, true_shape] = [pairs.iter().map(|p| p.1).collect::<Vec<_>>(), pairs.iter().map(|p| p.2).collect()]
+        .map(|moved| affine(&still, &moved)[k[0]][k[1]]);
     table.row([found.motion.into(), what.into(), format!("{closed:.5}"), format!("{found_shape:.5}"), format!("{true_shape:.5}")]);
     Ok(())
 }

@@ -48,7 +48,8 @@ impl Table {
     /// A Markdown table under its title in bold.
     #[must_use]
     pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.iter().map(|cell| cell.replace('|', "\\|")).collect::<Vec<_>>().join(" | "));
+        let line =
+            |cells: &[String]| format!("| {} |\n", cells.iter().map(|cell| cell.replace('|', "\\|")).collect::<Vec<_>>().join(" | "));
         let mut text = format!("**{}**\n\n{}|{}\n", self.title, line(&self.columns), "---|".repeat(self.columns.len()));
         for row in &self.rows {
             text += &line(row);

@@ -96,8 +96,8 @@ fn delays_come_out_as_no_delay() {
         eprintln!("{}{}", report.tables[0].1.text(), report.tables[1].1.text());
         assert!(cell(&report, "fig14", &["camsim, its own frame"], "RK2 by pictures") < 0.03);
         assert!(cell(&report, "fig14", &["36"], "RK2") > 1.0 && cell(&report, "fig14", &["2"], "RK2") < 0.02);
-        let [paper, own] =
-            ["RK2, from the frame of the stamp", "camsim"].map(|model| cell(&report, "fig15", &["right", model], "pixels with the wrong surface"));
+        let [paper, own] = ["RK2, from the frame of the stamp", "camsim"]
+            .map(|model| cell(&report, "fig15", &["right", model], "pixels with the wrong surface"));
         assert!(paper > 20.0 * own.max(1.0), "the rim that the paper loses: {paper}, here {own}");
         writes_itself(&report, "time");
     });
@@ -131,7 +131,8 @@ fn fields_and_exposures_are_those_of_perfect_pictures() {
         let blur = Experiment::Blur.run(setup).expect("done");
         eprintln!("{}{}", blur.tables[0].1.text(), blur.tables[1].1.text());
         let exact = "against the exact exposure, dB";
-        let [straight, own] = [["paper: RK2, straight line", "100"], ["camsim", "by its own rule"]].map(|row| cell(&blur, "fig16", &row, exact));
+        let [straight, own] =
+            [["paper: RK2, straight line", "100"], ["camsim", "by its own rule"]].map(|row| cell(&blur, "fig16", &row, exact));
         assert!(own > 35.0 && own > straight + 10.0, "{own} {straight}");
     });
 }
@@ -143,7 +144,9 @@ fn one_second_over_terrain() {
         let report = Experiment::Map.run(setup).expect("done");
         eprintln!("{}", report.tables[0].1.text());
         assert!(cell(&report, "fig21", &["delay, 1 s later"], "camsim: RMS") < 0.01);
-        assert!(cell(&report, "fig21", &["rolling shutter"], "smooth: RMS") < 0.1 * cell(&report, "fig21", &["rolling shutter"], "paper: RMS"));
+        assert!(
+            cell(&report, "fig21", &["rolling shutter"], "smooth: RMS") < 0.1 * cell(&report, "fig21", &["rolling shutter"], "paper: RMS")
+        );
         writes_itself(&report, "map");
     });
 }

@@ -85,7 +85,8 @@ fn rotation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceError
         .filter_map(|at| camera.unproject(at))
         .collect();
     let focal_px = camera.focal_px.x;
-    let [on_circles, on_frame, pitched] = [(&centres, DVec3::Z), (&grid, DVec3::Z), (&grid, DVec3::X)].map(|(at, axis)| errors(at, focal_px, axis));
+    let [on_circles, on_frame, pitched] =
+        [(&centres, DVec3::Z), (&grid, DVec3::Z), (&grid, DVec3::X)].map(|(at, axis)| errors(at, focal_px, axis));
 
     // The same as somebody measures it who has only the pictures: circles found in them.
     let ideal = Ideal::at(setup.engine, &bench, 1.0)?;
@@ -188,9 +189,10 @@ fn translation(setup: &Setup<'_>, report: &mut Report) -> Result<(), ReproduceEr
     report.tables.push(("fig15", table));
     report.pictures.push(Picture {
         name: "fig15",
-        caption: "Fig. 15: flight to the right (above) and downwards (below): (a, d) no delay, (b, e) 1 s later with 1 s of delay by the linear \
+        caption:
+            "Fig. 15: flight to the right (above) and downwards (below): (a, d) no delay, (b, e) 1 s later with 1 s of delay by the linear \
                   model, where a rim of the target disappears because depth is read where the sky is, (c, f) the same by camsim."
-            .into(),
+                .into(),
         frames,
         columns: 3,
         shrink: 2,

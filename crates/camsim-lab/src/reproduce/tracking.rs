@@ -65,7 +65,10 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     let (flight, program) = if real {
         ("FSR 2015-ASL, lawnmower sequence", REFERENCE_PROGRAM.map(short))
     } else {
-        ("camsim's built-in flight: the paper's log needs --data, and its figures do not compare with these", [(); 6].map(|()| "-".to_owned()))
+        (
+            "camsim's built-in flight: the paper's log needs --data, and its figures do not compare with these",
+            [(); 6].map(|()| "-".to_owned()),
+        )
     };
     report.notes.push(format!(
         "Log: {flight}; {} rows, {:.0} s. Limits as in the paper: 2 g and 60 deg/s^2, here on the lengths of the vectors. The paper's own table 1 \
@@ -73,7 +76,10 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         log.rows.len(),
         log.duration_s()
     ));
-    let mut table = Table::new("RMS distance from the interpolated log", &["channel", "sqrt", "spline", "reference program", "sqrt, max", "spline, max"]);
+    let mut table = Table::new(
+        "RMS distance from the interpolated log",
+        &["channel", "sqrt", "spline", "reference program", "sqrt, max", "spline, max"],
+    );
     let [sqrt, spline] = [0, 1].map(|k: usize| (listed(&followed[k].report.rms), listed(&followed[k].report.max_error)));
     for (i, name) in ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg", "attitude, deg"].into_iter().enumerate() {
         let program = program.get(i).cloned().unwrap_or_else(|| "-".to_owned());
@@ -92,7 +98,10 @@ fn listed(channels: &Channels) -> [f64; 7] {
 
 /// What the motions take of the limits.
 fn motion(followed: &[Followed]) -> Table {
-    let mut table = Table::new("Largest motion used", &["tracker", "speed, m/s", "acceleration, m/s^2", "rate, deg/s", "angular acceleration, deg/s^2"]);
+    let mut table = Table::new(
+        "Largest motion used",
+        &["tracker", "speed, m/s", "acceleration, m/s^2", "rate, deg/s", "angular acceleration, deg/s^2"],
+    );
     for Followed { name, report, .. } in followed {
         let used = &report.max_used;
         table.row([
