@@ -10,6 +10,7 @@ pub mod explain;
 pub mod info;
 pub mod lens;
 pub mod render;
+pub mod reproduce;
 pub mod track;
 pub mod verify;
 pub mod viewer;

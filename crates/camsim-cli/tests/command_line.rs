@@ -32,12 +32,14 @@ fn help_names_every_command_and_every_exit_code() {
         "demo",
         "render",
         "explain",
+        "verify",
         "track",
         "lens",
         "camera",
         "apply",
         "compare",
         "bench",
+        "reproduce",
         "info",
         "viewer",
         "completions",
@@ -46,7 +48,7 @@ fn help_names_every_command_and_every_exit_code() {
     ] {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
-    for command in ["demo", "render", "explain", "verify", "track", "lens", "camera", "compare", "bench", "info", "viewer", "completions"] {
+    for command in ["demo", "render", "explain", "verify", "track", "lens", "camera", "apply", "compare", "bench", "reproduce", "info", "viewer", "completions"] {
         let (code, out, _) = camsim([command, "--help"]);
         assert_eq!(code, 0, "{command}");
         assert!(out.contains("Usage: camsim"), "{out}");
@@ -123,6 +125,17 @@ fn calibrations_of_other_programs_become_camera_files() {
     assert!(code == 0 && out.contains("100.000 %"), "{out}{err}");
     let (code, out, _) = camsim(["camera", "import", text(&kalibr), "-q"]);
     assert_eq!((code, out), (0, fs::read_to_string(&camera).unwrap()));
+}
+
+#[test]
+fn experiments_refuse_what_they_cannot_use() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, _, err) = camsim(["reproduce", "time", "--width", "12"]);
+    assert!(code == 2 && err.contains("--width 12: must be 96 to 4096"), "{err}");
+    let (code, _, err) = camsim(["reproduce", "tracking", "--data", text(folder.path())]);
+    assert!(code == 2 && err.contains("path_lawnmower.csv") && err.contains(text(folder.path())), "{err}");
+    let (code, _, err) = camsim(["reproduce", "figure14"]);
+    assert!(code == 2 && err.contains("figure14") && err.contains("tracking"), "{err}");
 }
 
 #[test]

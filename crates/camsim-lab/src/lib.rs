@@ -3,4 +3,5 @@
 pub mod bench;
 pub mod cases;
 pub mod plot;
+pub mod reproduce;
 pub mod timing;

@@ -1,0 +1,145 @@
+//! `camsim reproduce`: the experiments of the paper.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_lab::reproduce::{Experiment, ReproduceError, Setup};
+
+use crate::{console::Console, failure::Failure};
+
+/// Names the folder of the paper's inputs where `--data` does not.
+const DATA_VARIABLE: &str = "CAMSIM_DATA";
+/// Pictures that circles can be found in, and that an adapter holds.
+const WIDTHS_PX: std::ops::RangeInclusive<u32> = 96..=4096;
+
+/// Do the experiments of the paper's section 8 again
+///
+/// Each experiment prints its tables and writes a folder of its own: tables (CSV), plots (SVG), pictures (PNG) and report.md with all of
+/// them. What came out, beside what the paper printed: docs/REPRODUCTION.md.
+///
+/// The paper's flight log, camera poses and target are not part of camsim. Give their folder with --data (or the environment variable
+/// CAMSIM_DATA); without it, tracking, lens and map run on built-in substitutes and say so. The others need no file.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Experiments:
+  tracking   8.1  how close the tracker stays to the flight log
+  lens       8.3  circles through the paper's fisheye, from 60 poses (figs. 11, 12)
+  time       8.4  the displacement models over one second (figs. 13, 14, 15)
+  blur       8.5  motion blur by samples (figs. 16, 17)
+  shutter    8.6  rolling shutter (figs. 18, 19)
+  interlace  8.7  interlacing (fig. 20)
+  map        8.8  time constants of one second over terrain (fig. 21)
+  speed      8.9  frames a second
+
+Examples:
+  camsim reproduce                                  all of them, in ./camsim-reproduce
+  camsim reproduce time blur -o out                 two of them
+  camsim reproduce tracking --data ~/camsim-data    on the paper's own log: ~/camsim-data/camsim/path_lawnmower.csv
+  camsim reproduce time --width 160                 small pictures, quick")]
+pub struct Args {
+    /// Which ones; all if left out
+    #[arg(value_name = "EXPERIMENT", value_enum)]
+    experiments: Vec<Which>,
+    /// Output folder; each experiment has a folder in it
+    #[arg(short, long, value_name = "DIR", default_value = "camsim-reproduce")]
+    output: PathBuf,
+    /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/, terrain/
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Width of the pictures, 4 to 3; the paper's are 640 px wide
+    #[arg(long, value_name = "PX", default_value_t = 640)]
+    width: u32,
+}
+
+/// An experiment, on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Which {
+    Tracking,
+    Lens,
+    Time,
+    Blur,
+    Shutter,
+    Interlace,
+    Map,
+    Speed,
+}
+
+impl Which {
+    fn experiment(self) -> Experiment {
+        match self {
+            Self::Tracking => Experiment::Tracking,
+            Self::Lens => Experiment::Lens,
+            Self::Time => Experiment::Time,
+            Self::Blur => Experiment::Blur,
+            Self::Shutter => Experiment::Shutter,
+            Self::Interlace => Experiment::Interlace,
+            Self::Map => Experiment::Map,
+            Self::Speed => Experiment::Speed,
+        }
+    }
+}
+
+/// Runs the experiments, prints their tables, writes their folders.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    if !WIDTHS_PX.contains(&args.width) {
+        let (least, most) = (WIDTHS_PX.start(), WIDTHS_PX.end());
+        return Err(Failure::bad_input(anyhow!("--width {}: must be {least} to {most} pixels", args.width)));
+    }
+    let data = data_folder(args)?;
+    // In the paper's order, whatever the order of the words.
+    let asked: Vec<Experiment> = args.experiments.iter().map(|which| which.experiment()).collect();
+    let chosen = Experiment::ALL.into_iter().filter(|experiment| asked.is_empty() || asked.contains(experiment));
+    let engine = Engine::new(AdapterChoice::Best)?;
+    console.note(format_args!("rendering on {}", engine.gpu().adapter));
+    if data.is_none() {
+        console.note(format_args!(
+            "no folder of the paper's inputs (--data, {DATA_VARIABLE}): tracking, lens and map run on built-in substitutes"
+        ));
+    }
+    let scratch = args.output.join("inputs");
+    let setup = Setup { engine: &engine, data: data.as_deref(), scratch: &scratch, width_px: args.width };
+    for experiment in chosen {
+        console.note(format_args!("{} ...", experiment.name()));
+        let report = experiment.run(&setup).map_err(of_reproduction)?;
+        let folder = args.output.join(experiment.name());
+        report.write(&folder, experiment.title()).map_err(of_reproduction)?;
+        console.line(experiment.title())?;
+        for note in &report.notes {
+            console.line(format_args!("  {note}"))?;
+        }
+        for (_, table) in &report.tables {
+            console.line(format_args!("\n{}", table.text().trim_end()))?;
+        }
+        console.line(format_args!("\n  all of it: {}\n", folder.join("report.md").display()))?;
+        console.flush()?;
+    }
+    Ok(())
+}
+
+/// The folder named by the command line or the environment; it must be there.
+fn data_folder(args: &Args) -> Result<Option<PathBuf>, Failure> {
+    let (folder, named_by) = match (&args.data, std::env::var_os(DATA_VARIABLE).filter(|value| !value.is_empty())) {
+        (Some(folder), _) => (folder.clone(), "--data"),
+        (None, Some(value)) => (PathBuf::from(value), DATA_VARIABLE),
+        (None, None) => return Ok(None),
+    };
+    if folder.join("camsim").is_dir() {
+        return Ok(Some(folder));
+    }
+    Err(Failure::bad_input(anyhow!(
+        "{named_by}: {} has no folder camsim/ with the paper's inputs (path_lawnmower.csv and others); name the folder above it, or leave \
+         {named_by} out to run on built-in substitutes",
+        folder.display()
+    )))
+}
+
+/// Files that cannot be read are bad input; everything else failed on the way.
+fn of_reproduction(error: ReproduceError) -> Failure {
+    match error {
+        ReproduceError::Gpu(error) => error.into(),
+        ReproduceError::Render(error) => error.into(),
+        ReproduceError::Write(_) | ReproduceError::Plot(_) => Failure::failed(error),
+        _ => Failure::bad_input(error),
+    }
+}
