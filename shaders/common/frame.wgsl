@@ -40,10 +40,11 @@ struct Frame {
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,
-    pad0: u32,
-    pad1: u32,
-    pad2: u32,
-    // Key camera in the world, for coords: NED position and the columns of ned_from_key.
+    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
+    keys: u32,
+    key_rows: u32,
+    exposure_share: f32,
+    // Mid-window camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,

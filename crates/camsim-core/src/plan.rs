@@ -23,12 +23,14 @@ use crate::{
 mod bounds;
 mod describe;
 mod edges;
+mod keys;
 mod lines;
 mod motion;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
+pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, line_poses, row_records};
 
 /// Nearest distance that the ideal frame can show, metres.
@@ -147,11 +149,13 @@ pub struct FramePlan {
     pub camera: Arc<CameraModel>,
     /// Row timing.
     pub shutter: Shutter,
-    /// Instant of the ideal frame, path time, seconds.
+    /// Middle of the window, path time, seconds.
     pub key_s: f64,
-    /// Its pose.
+    /// The pose then: the camera that source coordinates are given in, and that of the ideal frame where there is only one.
     pub key_pose: CameraPose,
-    /// Its pixels.
+    /// Instants and poses of the ideal frames, in order of time.
+    pub keys: Vec<KeyFrame>,
+    /// Pixels of each ideal frame.
     pub ideal: IdealGeometry,
     /// Lens inverse.
     pub ray: RayStage,
@@ -176,6 +180,13 @@ impl FramePlan {
     #[must_use]
     pub fn tangents(&self) -> [f64; 4] {
         self.ideal.tangents()
+    }
+
+    /// How much of the frame's window has gone by at an instant, path time, seconds: 0 to 1 within it.
+    #[must_use]
+    pub fn window_share(&self, t_s: f64) -> f64 {
+        let [first_s, last_s] = self.window_s;
+        if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 }
     }
 }
 
@@ -253,7 +264,9 @@ impl Planner {
         let quality = &self.sequence.scenario.quality;
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
-        let ideal = bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene);
+        let geometry = |keys: &[KeyFrame]| bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene);
+        let one_key = keys::spread(path, window_s, 1);
+        let mut ideal = geometry(&one_key);
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
@@ -266,6 +279,16 @@ impl Planner {
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
+        let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
+        let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
+            let keys = keys::spread(path, window_s, count);
+            let ideal = geometry(&keys);
+            (keys, ideal)
+        });
+        let keys = keys.map_or(one_key, |(keys, of_keys)| {
+            ideal = of_keys;
+            keys
+        });
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
@@ -277,6 +300,7 @@ impl Planner {
             shutter: self.shutter,
             key_s,
             key_pose,
+            keys,
             ideal,
             ray,
             temporal,

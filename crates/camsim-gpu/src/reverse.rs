@@ -15,7 +15,7 @@ use glam::DMat3;
 
 use crate::{
     context::GpuContext,
-    ideal::FineTarget,
+    ideal::{FineTarget, key_rows},
     layout::FrameUniforms,
     shaders::{self, ComposeError, Slot},
 };
@@ -45,6 +45,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
+    /// More than one ideal frame.
+    pub keys: bool,
     /// Rays of their own at silhouettes.
     pub edges: bool,
     /// Depth and coordinates beside the picture.
@@ -60,7 +62,14 @@ impl PipelineKey {
             TemporalStage::Rotation => TemporalKind::Rotation,
             TemporalStage::Reproject { .. } => TemporalKind::Reproject,
         };
-        Self { ray: plan.ray, temporal, blur: plan.blur.is_some(), edges: plan.edges != EdgeStage::None, truth: plan.truth }
+        Self {
+            ray: plan.ray,
+            temporal,
+            blur: plan.blur.is_some(),
+            keys: plan.keys.len() > 1,
+            edges: plan.edges != EdgeStage::None,
+            truth: plan.truth,
+        }
     }
 
     /// Every key that a plan can have.
@@ -74,8 +83,13 @@ impl PipelineKey {
                     if blur && temporal == TemporalKind::Identity {
                         continue;
                     }
-                    for edges in [false, true] {
-                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, edges, truth }));
+                    // Without parallax all key cameras see the same.
+                    let parallax = temporal == TemporalKind::Reproject;
+                    for (several, edges) in [(false, false), (false, true), (true, false), (true, true)] {
+                        if several && !parallax {
+                            continue;
+                        }
+                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, keys: several, edges, truth }));
                     }
                 }
             }
@@ -85,7 +99,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 5] {
+    pub fn slots(&self) -> [Slot; 6] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -95,10 +109,11 @@ impl PipelineKey {
             TemporalKind::Rotation => "reverse/temporal_inverse/rotation.wgsl",
             TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
         };
+        let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
         let gather = if self.blur { "reverse/gather/blur.wgsl" } else { "reverse/gather/sharp.wgsl" };
         let edges = if self.edges { "reverse/edges/supersampled.wgsl" } else { "reverse/edges/none.wgsl" };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
-        [("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("edges", edges), ("emit", emit)]
+        [("keys", keys), ("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("edges", edges), ("emit", emit)]
     }
 }
 
@@ -314,8 +329,10 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         ned_from_key_z: column(2),
         edge_scale,
         edge_samples,
+        keys: plan.keys.len() as u32,
+        key_rows: key_rows(&plan.ideal),
+        exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
-        ..FrameUniforms::default()
     }
 }
 
@@ -335,6 +352,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 40);
+        assert_eq!(PipelineKey::all().len(), 56);
     }
 }

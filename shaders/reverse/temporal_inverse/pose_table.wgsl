@@ -1,4 +1,4 @@
-// Relative poses: x_key = R x_line + t, one entry a line and exposure node, made in f64 on the CPU.
+// Relative poses: x_key = R x_line + t, one entry a key, line and exposure node, made in f64 on the CPU.
 struct Pose {
     // Rows of R, with t in w.
     x: vec4<f32>,
@@ -13,7 +13,7 @@ fn line_entry(pixel: vec2<u32>) -> u32 {
     let line = select(pixel.y, pixel.x, frame.line_axis == 1u);
     let field = select(0u, pixel.y & 1u, frame.fields == 2u);
     let stride = select(frame.nodes + 1u, 1u, frame.nodes == 1u);
-    return (field * frame.lines + line) * stride;
+    return ((key_number() * frame.fields + field) * frame.lines + line) * stride;
 }
 
 fn pose_at_node(pixel: vec2<u32>, node: u32) -> Pose {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
+use super::KeyFrame;
 use crate::{camera::CameraModel, mount::CameraPath, scene::Scene, shutter::Shutter, temporal::IdealGeometry};
 
 /// Grid step of the search for the lens's reach, pixels.
@@ -97,13 +98,14 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
 }
 
 /// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
-/// exposure), at infinity and at the nearest depth in view.
+/// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time.
 pub(super) fn ideal_geometry(
     reach: &LensReach,
     path: &CameraPath,
     shutter: &Shutter,
     stamp_s: f64,
     key_s: f64,
+    keys: &[KeyFrame],
     scene: &Scene,
 ) -> IdealGeometry {
     let key = path.pose(key_s);
@@ -119,14 +121,17 @@ pub(super) fn ideal_geometry(
     for &(uv, [x, y]) in &reach.rays {
         let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
         for phase in [-0.5, 0.0, 0.5] {
-            let (rotation, shift) = path.pose(mid_s + phase * shutter.exposure_s()).relative_to(&key);
-            let direction = rotation * uv.extend(1.0);
-            for w in [0.0, inverse_near] {
-                let in_key = direction + w * shift;
-                if in_key.z > 0.02 {
-                    let at = in_key.truncate() / in_key.z;
-                    low = low.min(at);
-                    high = high.max(at);
+            let pose = path.pose(mid_s + phase * shutter.exposure_s());
+            for key in super::keys::nearest_two(keys, mid_s) {
+                let (rotation, shift) = pose.relative_to(&key.pose);
+                let direction = rotation * uv.extend(1.0);
+                for w in [0.0, inverse_near] {
+                    let in_key = direction + w * shift;
+                    if in_key.z > 0.02 {
+                        let at = in_key.truncate() / in_key.z;
+                        low = low.min(at);
+                        high = high.max(at);
+                    }
                 }
             }
         }

@@ -5,8 +5,10 @@ use glam::{DMat3, DVec3};
 use super::{FramePlan, table_shape};
 use crate::{frame::RowRecord, mount::CameraPath, shutter::LinesAxis};
 
-/// Relative poses `x_key = R x_line + t` of a frame: `[field][line][node]`, each three rows of `(R, t)`; with more than one node the
-/// mid-exposure pose follows the nodes.
+/// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`; with more than one node
+/// the mid-exposure pose follows the nodes. Of frames with several keys two more parts follow: the poses `x_mid = R x_key + t` of the
+/// keys in the mid-window camera, then an entry for each field and line with the line's mid-exposure as a share of the window in its
+/// first number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePoses {
     /// Rows of `(R | t)`.
@@ -21,12 +23,13 @@ pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
     let (_, lines, fields) = table_shape(&plan.shutter);
     let nodes = plan.blur.map_or(1, |blur| blur.nodes);
     let stride = if nodes == 1 { 1 } else { nodes + 1 };
-    let mut entries = Vec::with_capacity((fields * lines * stride) as usize);
-    for field in 0..fields {
-        for line in 0..lines {
+    let keys = plan.keys.len();
+    let mut entries = Vec::with_capacity(keys * (fields * lines * stride) as usize);
+    for key in &plan.keys {
+        for (field, line) in lines_of(fields, lines) {
             let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
             let mut push = |t_s: f64| {
-                let (rotation, shift) = path.pose(t_s).relative_to(&plan.key_pose);
+                let (rotation, shift) = path.pose(t_s).relative_to(&key.pose);
                 entries.push(rows_of(rotation, shift));
             };
             if nodes > 1 {
@@ -37,7 +40,21 @@ pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
             push(mid_s);
         }
     }
+    if keys > 1 {
+        entries.extend(plan.keys.iter().map(|key| {
+            let (rotation, shift) = key.pose.relative_to(&plan.key_pose);
+            rows_of(rotation, shift)
+        }));
+        entries.extend(lines_of(fields, lines).map(|(field, line)| {
+            let share = plan.window_share(plan.stamp_s + line_dt_s(plan, field, line));
+            [[share as f32, 0.0, 0.0, 0.0], [0.0; 4], [0.0; 4]]
+        }));
+    }
     LinePoses { entries, stride }
+}
+
+fn lines_of(fields: u32, lines: u32) -> impl Iterator<Item = (u32, u32)> {
+    (0..fields).flat_map(move |field| (0..lines).map(move |line| (field, line)))
 }
 
 /// Time shift of a line of a field: with sideways readout the fields are the even and the odd rows.
