@@ -40,15 +40,24 @@ struct Frame {
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,
-    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
-    keys: u32,
-    key_rows: u32,
-    exposure_share: f32,
+    // Largest rotation of a step of the rk2 solver.
+    rk2_step_rad: f32,
+    pad1: u32,
+    pad2: u32,
     // Mid-window camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
     ned_from_key_z: vec4<f32>,
+    // The key camera's motion in its own axes, for the solvers that take it as constant: velocity of the optical centre; angular rate, and
+    // its length in w.
+    key_velocity_m_s: vec4<f32>,
+    key_rate_rad_s: vec4<f32>,
+    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
+    keys: u32,
+    key_rows: u32,
+    exposure_share: f32,
+    pad3: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -17,12 +17,13 @@ use crate::{
     scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
-    temporal::IdealGeometry,
+    temporal::{IdealGeometry, displacement::Twist},
 };
 
 mod bounds;
 mod describe;
 mod edges;
+mod forced;
 mod keys;
 mod lines;
 mod motion;
@@ -31,7 +32,7 @@ pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
-pub use lines::{LinePoses, line_poses, row_records};
+pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
@@ -89,6 +90,10 @@ pub enum TemporalStage {
         /// Depth look-ups.
         iterations: u32,
     },
+    /// One straight step at constant twist and depth (eq. 16).
+    Linear,
+    /// Heun's steps of at most 2.5 deg at constant twist and depth (eq. 18).
+    Rk2,
 }
 
 /// Motion blur.
@@ -153,6 +158,8 @@ pub struct FramePlan {
     pub key_s: f64,
     /// The pose then: the camera that source coordinates are given in, and that of the ideal frame where there is only one.
     pub key_pose: CameraPose,
+    /// The camera's motion then, in its own axes: all that the constant-twist solvers know of it.
+    pub key_twist: Twist,
     /// Instants and poses of the ideal frames, in order of time.
     pub keys: Vec<KeyFrame>,
     /// Pixels of each ideal frame.
@@ -264,19 +271,29 @@ impl Planner {
         let quality = &self.sequence.scenario.quality;
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
-        let geometry = |keys: &[KeyFrame]| bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene);
+        let key_pose = path.pose(key_s);
+        let key_twist = Twist {
+            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
+            rate_rad_s: path.rate_camera(key_s),
+        };
+        let demanded = forced::temporal_stage(quality);
+        let geometry = |keys: &[KeyFrame]| {
+            let displaced = demanded.map(|stage| (stage, key_twist));
+            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene, displaced)
+        };
         let one_key = keys::spread(path, window_s, 1);
         let mut ideal = geometry(&one_key);
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
-        let key_pose = path.pose(key_s);
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
         let ray = ray_stage(&reach, &mut skipped);
-        let temporal = motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped);
+        let temporal = demanded
+            .unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
         let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+        let blur = forced::blur_stage(temporal, blur, quality, &motion);
         let edges =
             edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
         let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
@@ -300,6 +317,7 @@ impl Planner {
             shutter: self.shutter,
             key_s,
             key_pose,
+            key_twist,
             keys,
             ideal,
             ray,
@@ -325,7 +343,7 @@ impl Planner {
         }
         if !self.truth {
             skip("depth and coordinates", "neither is among the output channels");
-            if !matches!(temporal, TemporalStage::Reproject { .. }) {
+            if matches!(temporal, TemporalStage::Identity | TemporalStage::Rotation) {
                 skip("depth read by the reverse pipeline", "no stage of this frame uses it");
             }
         }

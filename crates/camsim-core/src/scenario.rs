@@ -189,6 +189,8 @@ pub struct QualitySpec {
     pub max_terrain_error_px: f64,
     /// Temporal solver.
     pub solver: Auto<Solver>,
+    /// Depth look-ups of `reproject`.
+    pub iterations: Auto<u32>,
     /// Exposure samples per pixel.
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel.
@@ -205,6 +207,7 @@ impl Default for QualitySpec {
             max_error_dn: 1.0,
             max_terrain_error_px: 0.25,
             solver: Auto::Auto,
+            iterations: Auto::Auto,
             blur_samples: Auto::Auto,
             footprint_taps: Auto::Auto,
             key_frames: Auto::Auto,

@@ -9,7 +9,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage, line_poses},
+    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage, TemporalStage, line_poses, line_times},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -394,8 +394,17 @@ impl Session<'_> {
         let gpu = &self.engine.gpu;
         let sequence = self.planner.sequence();
         let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
-        let table = line_poses(plan, &sequence.path);
-        let bytes: &[u8] = bytemuck::cast_slice(&table.entries);
+        let (poses, times);
+        let bytes: &[u8] = match plan.temporal {
+            TemporalStage::Linear | TemporalStage::Rk2 => {
+                times = line_times(plan);
+                bytemuck::cast_slice(&times.dt_s)
+            }
+            _ => {
+                poses = line_poses(plan, &sequence.path);
+                bytemuck::cast_slice(&poses.entries)
+            }
+        };
         let slot = &mut self.slots[slot];
         if slot.poses.size() < bytes.len() as u64 {
             slot.poses = pose_buffer(gpu, bytes.len() as u64);

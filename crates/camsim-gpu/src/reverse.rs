@@ -10,6 +10,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, RayStage, TemporalStage, table_shape},
     scenario::Scenario,
     shutter::LinesAxis,
+    temporal::displacement::RK2_STEP_DEG,
 };
 use glam::DMat3;
 
@@ -34,6 +35,8 @@ pub enum TemporalKind {
     Identity,
     Rotation,
     Reproject,
+    Linear,
+    Rk2,
 }
 
 /// Which stages a kernel is made of.
@@ -61,6 +64,8 @@ impl PipelineKey {
             TemporalStage::Identity => TemporalKind::Identity,
             TemporalStage::Rotation => TemporalKind::Rotation,
             TemporalStage::Reproject { .. } => TemporalKind::Reproject,
+            TemporalStage::Linear => TemporalKind::Linear,
+            TemporalStage::Rk2 => TemporalKind::Rk2,
         };
         Self {
             ray: plan.ray,
@@ -75,12 +80,13 @@ impl PipelineKey {
     /// Every key that a plan can have.
     #[must_use]
     pub fn all() -> Vec<Self> {
+        use TemporalKind::{Identity, Linear, Reproject, Rk2, Rotation};
         let mut keys = Vec::new();
         for ray in [RayStage::Pinhole, RayStage::LensMap] {
-            for temporal in [TemporalKind::Identity, TemporalKind::Rotation, TemporalKind::Reproject] {
+            for temporal in [Identity, Rotation, Linear, Rk2, Reproject] {
                 for blur in [false, true] {
                     // Without motion there is no blur.
-                    if blur && temporal == TemporalKind::Identity {
+                    if blur && temporal == Identity {
                         continue;
                     }
                     // Without parallax all key cameras see the same.
@@ -108,6 +114,8 @@ impl PipelineKey {
             TemporalKind::Identity => "reverse/temporal_inverse/identity.wgsl",
             TemporalKind::Rotation => "reverse/temporal_inverse/rotation.wgsl",
             TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
+            TemporalKind::Linear => "reverse/temporal_inverse/linear.wgsl",
+            TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
         };
         let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
         let gather = if self.blur { "reverse/gather/blur.wgsl" } else { "reverse/gather/sharp.wgsl" };
@@ -130,7 +138,7 @@ pub struct ReverseBindings<'a> {
     pub depth: &'a wgpu::TextureView,
     /// The ideal frame's samples, when the key reads them.
     pub fine: Option<&'a FineTarget>,
-    /// Relative poses.
+    /// Relative poses of the lines, or their times for the constant-twist solvers.
     pub poses: &'a wgpu::Buffer,
     /// Vignette weights.
     pub vignette: &'a wgpu::Buffer,
@@ -333,6 +341,10 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         key_rows: key_rows(&plan.ideal),
         exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
+        rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
+        key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
+        key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),
+        ..FrameUniforms::default()
     }
 }
 
@@ -352,6 +364,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 56);
+        assert_eq!(PipelineKey::all().len(), 88);
     }
 }

@@ -45,10 +45,14 @@ embedded![
     "reverse/ray/map.wgsl",
     "reverse/ray/pinhole.wgsl",
     "reverse/reverse.wgsl",
+    "reverse/temporal_inverse/constant_depth.wgsl",
     "reverse/temporal_inverse/identity.wgsl",
     "reverse/temporal_inverse/interface.wgsl",
+    "reverse/temporal_inverse/line_entry.wgsl",
+    "reverse/temporal_inverse/linear.wgsl",
     "reverse/temporal_inverse/pose_table.wgsl",
     "reverse/temporal_inverse/reproject.wgsl",
+    "reverse/temporal_inverse/rk2.wgsl",
     "reverse/temporal_inverse/rotation.wgsl",
 ];
 

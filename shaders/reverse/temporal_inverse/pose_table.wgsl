@@ -1,4 +1,6 @@
 // Relative poses: x_key = R x_line + t, one entry a key, line and exposure node, made in f64 on the CPU.
+#import reverse/temporal_inverse/line_entry.wgsl
+
 struct Pose {
     // Rows of R, with t in w.
     x: vec4<f32>,
@@ -7,14 +9,6 @@ struct Pose {
 }
 
 @group(1) @binding(3) var<storage, read> poses: array<Pose>;
-
-// First entry of the pixel's line.
-fn line_entry(pixel: vec2<u32>) -> u32 {
-    let line = select(pixel.y, pixel.x, frame.line_axis == 1u);
-    let field = select(0u, pixel.y & 1u, frame.fields == 2u);
-    let stride = select(frame.nodes + 1u, 1u, frame.nodes == 1u);
-    return ((key_number() * frame.fields + field) * frame.lines + line) * stride;
-}
 
 fn pose_at_node(pixel: vec2<u32>, node: u32) -> Pose {
     return poses[line_entry(pixel) + node];

@@ -4,8 +4,14 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::KeyFrame;
-use crate::{camera::CameraModel, mount::CameraPath, scene::Scene, shutter::Shutter, temporal::IdealGeometry};
+use super::{KeyFrame, TemporalStage};
+use crate::{
+    camera::CameraModel,
+    mount::CameraPath,
+    scene::Scene,
+    shutter::Shutter,
+    temporal::{IdealGeometry, displacement::Twist},
+};
 
 /// Grid step of the search for the lens's reach, pixels.
 const STEP_PX: u32 = 4;
@@ -98,7 +104,8 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
 }
 
 /// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
-/// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time.
+/// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time. A `demanded` constant-twist solver
+/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth.
 pub(super) fn ideal_geometry(
     reach: &LensReach,
     path: &CameraPath,
@@ -107,6 +114,7 @@ pub(super) fn ideal_geometry(
     key_s: f64,
     keys: &[KeyFrame],
     scene: &Scene,
+    demanded: Option<(TemporalStage, Twist)>,
 ) -> IdealGeometry {
     let key = path.pose(key_s);
     // A lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory is not worth it.
@@ -120,18 +128,24 @@ pub(super) fn ideal_geometry(
     let mut high = DVec2::splat(f64::NEG_INFINITY);
     for &(uv, [x, y]) in &reach.rays {
         let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+        let mut include = |at: DVec2| {
+            low = low.min(at);
+            high = high.max(at);
+        };
         for phase in [-0.5, 0.0, 0.5] {
-            let pose = path.pose(mid_s + phase * shutter.exposure_s());
-            for key in super::keys::nearest_two(keys, mid_s) {
-                let (rotation, shift) = pose.relative_to(&key.pose);
-                let direction = rotation * uv.extend(1.0);
-                for w in [0.0, inverse_near] {
-                    let in_key = direction + w * shift;
+            let t_s = mid_s + phase * shutter.exposure_s();
+            let pose = path.pose(t_s);
+            for w in [0.0, inverse_near] {
+                for key in super::keys::nearest_two(keys, mid_s) {
+                    let (rotation, shift) = pose.relative_to(&key.pose);
+                    let in_key = rotation * uv.extend(1.0) + w * shift;
                     if in_key.z > 0.02 {
-                        let at = in_key.truncate() / in_key.z;
-                        low = low.min(at);
-                        high = high.max(at);
+                        include(in_key.truncate() / in_key.z);
                     }
+                }
+                if let Some(at) = demanded.and_then(|(stage, twist)| stage.displaced(uv, w, &twist, t_s - key_s)) {
+                    include(at);
+                    include(uv);
                 }
             }
         }

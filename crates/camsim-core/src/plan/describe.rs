@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{BlurStage, EdgeStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
+use crate::temporal::displacement::RK2_STEP_DEG;
 
 /// The plan's figures, ready to serialise.
 #[derive(Clone, Debug, Serialize)]
@@ -85,6 +86,8 @@ impl FramePlan {
             TemporalStage::Identity => "no motion".to_owned(),
             TemporalStage::Rotation => "rotation per line".to_owned(),
             TemporalStage::Reproject { iterations } => format!("reproject per line, {iterations} depth look-ups"),
+            TemporalStage::Linear => "linear displacement (eq. 16) at the key instant's twist".to_owned(),
+            TemporalStage::Rk2 => format!("RK2 displacement (eq. 18), steps of {RK2_STEP_DEG} deg, at the key instant's twist"),
         };
         let gather = match self.blur {
             None => "sharp".to_owned(),

@@ -140,9 +140,14 @@ pub(super) fn blur_stage(
     let by_vibration = (NODES_PER_PERIOD * path.highest_vibration_hz() * shutter.exposure_s()).ceil();
     let segments = by_curve.max(if motion.blur_sagitta_px > NEGLIGIBLE * quality.max_error_px { by_vibration } else { 1.0 });
     let nodes = segments.clamp(1.0, f64::from(MAX_NODES - 1)) as u32 + 1;
+    Some(samples_between(nodes, quality, motion))
+}
+
+/// Samples of an exposure of so many nodes.
+pub(super) fn samples_between(nodes: u32, quality: &QualitySpec, motion: &Motion) -> BlurStage {
     let (samples_per_px, max_samples) = match quality.blur_samples.value() {
         Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
         None => (2.0, ((2.0 * motion.blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, 512)),
     };
-    Some(BlurStage { nodes, samples_per_px, max_samples })
+    BlurStage { nodes, samples_per_px, max_samples }
 }

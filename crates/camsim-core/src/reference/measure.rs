@@ -1,15 +1,15 @@
-//! The error of a rendered frame's source coordinates, in pixels of its ideal frame.
+//! The error of a rendered frame against the oracle: of its source coordinates, in pixels of its ideal frame, and of its light.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::{Look, Oracle};
+use super::{KeyFrame, Look, Oracle};
 use crate::{frame::RenderedFrame, plan::FramePlan};
 
-/// A depth step between neighbours, relative to the nearer, beyond what one surface has.
-const STEP: f64 = 0.02;
+/// A second difference of inverse depth between neighbours, relative to the nearest of them, beyond what one smooth surface has.
+const STEP: f64 = 0.005;
 /// Distance from a silhouette within which pixels count as "at" it, output pixels.
-const NEAR_PX: i64 = 3;
+const NEAR_PX: usize = 3;
 
 /// Errors of one kind of pixel, pixels of the ideal frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,10 +25,15 @@ pub struct ErrorStats {
 }
 
 impl ErrorStats {
-    /// Of a set of error magnitudes.
+    /// Of a set of error magnitudes. One that is not a number makes all but the count infinite: it must not hide.
     #[must_use]
     pub fn of(mut errors_px: Vec<f64>) -> Self {
-        errors_px.sort_by(f64::total_cmp);
+        for error in &mut errors_px {
+            if error.is_nan() {
+                *error = f64::INFINITY;
+            }
+        }
+        errors_px.sort_unstable_by(f64::total_cmp);
         let count = errors_px.len();
         let Some(&max_px) = errors_px.last() else { return Self::default() };
         let mean_square = errors_px.iter().map(|e| e * e).sum::<f64>() / count as f64;
@@ -42,7 +47,7 @@ impl ErrorStats {
 pub struct CoordErrors {
     /// All pixels that have a source in both.
     pub all: ErrorStats,
-    /// Those farther than 3 px from any silhouette.
+    /// Those farther than 3 px from any silhouette whose point the key camera sees.
     pub smooth: ErrorStats,
     /// The others.
     pub silhouettes: ErrorStats,
@@ -52,51 +57,171 @@ pub struct CoordErrors {
     pub missing: u64,
 }
 
+/// What is compared of one pixel.
+enum Compared {
+    Skipped,
+    FalselyValid,
+    Missing,
+    Error { px: f64, at_silhouette: bool },
+}
+
 /// Compares `coords` of a frame, rendered by `plan` at exposure phase `phase`, with the oracle: where the point that the pixel's own ray
-/// meets lies in the ideal frame. Every `step`-th pixel in both directions. `None` without coords.
+/// meets lies in the ideal frame. Every `step`-th pixel in both directions. A pixel counts as at a silhouette within 3 px of one, and where
+/// its true point is hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the sequence's.
 #[must_use]
 pub fn coord_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
     let coords = frame.coords.as_ref()?;
     let [width, height] = frame.size_px;
-    let looks: Vec<Option<Look>> =
-        (0..width * height).into_par_iter().map(|i| oracle.look(plan.frame, [i % width, i / width], DVec2::ZERO, phase)).collect();
-    let camera_from_ned = plan.key_pose.ned_from_camera.inverse();
-    let source = |look: &Look| {
-        let in_key = match &look.hit {
-            Some(hit) => camera_from_ned * (hit.point_ned_m - plan.key_pose.position_ned_m),
-            None => camera_from_ned * (look.pose.ned_from_camera * look.uv.extend(1.0)),
-        };
-        plan.ideal.px_from_point(in_key)
-    };
-    let at = |x: i64, y: i64| looks[(y.clamp(0, i64::from(height) - 1) * i64::from(width) + x.clamp(0, i64::from(width) - 1)) as usize];
-    let jumps = |a: Option<Look>, b: Option<Look>| match (a.and_then(|l| l.hit), b.and_then(|l| l.hit)) {
-        (Some(a), Some(b)) => a.surface != b.surface || (a.depth_m - b.depth_m).abs() > STEP * a.depth_m.min(b.depth_m),
-        (None, None) => false,
-        _ => a.is_some() && b.is_some(),
-    };
-    let (mut smooth, mut edges) = (Vec::new(), Vec::new());
-    let mut errors = CoordErrors::default();
-    for y in (0..height).step_by(step.max(1) as usize) {
-        for x in (0..width).step_by(step.max(1) as usize) {
-            let i = (y * width + x) as usize;
-            let valid = frame.color_rgba[4 * i + 3] > 0.0;
-            let Some(look) = &looks[i] else {
-                errors.falsely_valid += u64::from(valid);
-                continue;
-            };
-            if !valid {
-                errors.missing += 1;
-                continue;
+    let pixels = width as usize * height as usize;
+    if frame.size_px != oracle.sequence.scenario.camera.size_px || coords.len() != pixels || frame.color_rgba.len() != 4 * pixels {
+        return None;
+    }
+    let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
+    let looks = looks(oracle, plan.frame, phase);
+    let near = dilated(&edges(&looks, frame.size_px), frame.size_px);
+    let compare = |i: usize| {
+        let valid = frame.color_rgba[4 * i + 3] > 0.0;
+        match (&looks[i], valid) {
+            (None, false) => Compared::Skipped,
+            (None, true) => Compared::FalselyValid,
+            (Some(_), false) => Compared::Missing,
+            (Some(look), true) => {
+                let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
+                let unseen =
+                    key.in_key(look).z <= 0.0 || look.hit.is_some_and(|hit| oracle.hides(key.pose.position_ned_m, hit.point_ned_m));
+                Compared::Error { px: found.distance(key.source_px(look)), at_silhouette: near[i] || unseen }
             }
-            let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
-            let error_px = found.distance(source(look));
-            let (x, y) = (i64::from(x), i64::from(y));
-            let near = (-NEAR_PX..=NEAR_PX).any(|dy| (-NEAR_PX..=NEAR_PX).any(|dx| jumps(Some(*look), at(x + dx, y + dy))));
-            if near { &mut edges } else { &mut smooth }.push(error_px);
+        }
+    };
+    let step = step.max(1);
+    let chosen: Vec<usize> =
+        (0..height).step_by(step as usize).flat_map(|y| (0..width).step_by(step as usize).map(move |x| (y * width + x) as usize)).collect();
+    let compared: Vec<Compared> = chosen.into_par_iter().map(compare).collect();
+    let (mut smooth, mut at_edges) = (Vec::new(), Vec::new());
+    let mut errors = CoordErrors::default();
+    for pixel in compared {
+        match pixel {
+            Compared::Skipped => {}
+            Compared::FalselyValid => errors.falsely_valid += 1,
+            Compared::Missing => errors.missing += 1,
+            Compared::Error { px, at_silhouette } => if at_silhouette { &mut at_edges } else { &mut smooth }.push(px),
         }
     }
-    errors.all = ErrorStats::of(smooth.iter().chain(&edges).copied().collect());
+    errors.all = ErrorStats::of(smooth.iter().chain(&at_edges).copied().collect());
     errors.smooth = ErrorStats::of(smooth);
-    errors.silhouettes = ErrorStats::of(edges);
+    errors.silhouettes = ErrorStats::of(at_edges);
     Some(errors)
+}
+
+/// How far a frame's light is from the oracle's. Peak is 1; channels R, G, B of pixels that are valid in both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageErrors {
+    /// All pixels.
+    pub all_db: f64,
+    /// Those farther than 3 px from any silhouette.
+    pub smooth_db: f64,
+    /// The others; infinite where there are none.
+    pub silhouettes_db: f64,
+    /// Pixels compared, and how many of them are at silhouettes.
+    pub pixels: [u64; 2],
+    /// Largest difference of any channel.
+    pub max: f64,
+}
+
+/// Compares a frame with the oracle's, both in linear light; `near` is [`silhouettes`] of the frame. `None` if sizes differ.
+#[must_use]
+pub fn image_errors(truth: &RenderedFrame, frame: &RenderedFrame, near: &[bool]) -> Option<ImageErrors> {
+    let same = truth.size_px == frame.size_px && truth.color_rgba.len() == frame.color_rgba.len();
+    if !same || 4 * near.len() != truth.color_rgba.len() {
+        return None;
+    }
+    let (mut squares, mut pixels, mut max) = ([0.0_f64; 2], [0_u64; 2], 0.0_f64);
+    for ((a, b), near) in truth.color_rgba.chunks_exact(4).zip(frame.color_rgba.chunks_exact(4)).zip(near) {
+        if a[3] <= 0.0 || b[3] <= 0.0 {
+            continue;
+        }
+        let kind = usize::from(*near);
+        pixels[kind] += 1;
+        for (a, b) in a[..3].iter().zip(b) {
+            let difference = (f64::from(*a) - f64::from(*b)).abs();
+            // Not a number is the largest difference of all.
+            let difference = if difference.is_nan() { f64::INFINITY } else { difference };
+            squares[kind] += difference * difference;
+            max = max.max(difference);
+        }
+    }
+    let psnr_db = |squares: f64, pixels: u64| if squares > 0.0 { -10.0 * (squares / (3.0 * pixels as f64)).log10() } else { f64::INFINITY };
+    Some(ImageErrors {
+        all_db: psnr_db(squares[0] + squares[1], pixels[0] + pixels[1]),
+        smooth_db: psnr_db(squares[0], pixels[0]),
+        silhouettes_db: psnr_db(squares[1], pixels[1]),
+        pixels: [pixels[0] + pixels[1], pixels[1]],
+        max,
+    })
+}
+
+/// Pixels of a frame within 3 px of a silhouette at any of the exposure phases given (from -0.5 to 0.5), row-major.
+#[must_use]
+pub fn silhouettes(oracle: &Oracle, frame: u64, phases: &[f64]) -> Vec<bool> {
+    let size_px = oracle.sequence.scenario.camera.size_px;
+    let mut marked = vec![false; size_px[0] as usize * size_px[1] as usize];
+    for &phase in phases {
+        for (marked, edge) in marked.iter_mut().zip(edges(&looks(oracle, frame, phase), size_px)) {
+            *marked |= edge;
+        }
+    }
+    dilated(&marked, size_px)
+}
+
+/// What the centre of every pixel sees.
+fn looks(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<Look>> {
+    let [width, height] = oracle.sequence.scenario.camera.size_px;
+    let view = oracle.view(frame);
+    (0..height)
+        .into_par_iter()
+        .flat_map_iter(|y| {
+            let view = &view;
+            (0..width).map(move |x| view.look([x, y], DVec2::ZERO, phase))
+        })
+        .collect()
+}
+
+/// Pixels between whose neighbours depth steps: inverse depth is linear over a plane, so its second difference tells a step from a slope.
+fn edges(looks: &[Option<Look>], [width, height]: [u32; 2]) -> Vec<bool> {
+    let (width, height) = (width as usize, height as usize);
+    let inverse_depth = |i: usize| looks[i].map(|look| look.hit.map_or(0.0, |hit| 1.0 / hit.depth_m));
+    let steps = |before: usize, here: usize, after: usize| {
+        let (Some(a), Some(b), Some(c)) = (inverse_depth(before), inverse_depth(here), inverse_depth(after)) else { return false };
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        (low == 0.0 && high > 0.0) || (a - 2.0 * b + c).abs() > STEP * high
+    };
+    (0..looks.len())
+        .into_par_iter()
+        .map(|i| {
+            let (x, y) = (i % width, i / width);
+            let across = x > 0 && x + 1 < width;
+            let along = y > 0 && y + 1 < height;
+            (across && steps(i - 1, i, i + 1))
+                || (along && steps(i - width, i, i + width))
+                || (across && along && (steps(i - width - 1, i, i + width + 1) || steps(i - width + 1, i, i + width - 1)))
+        })
+        .collect()
+}
+
+/// All pixels within 3 of a marked one, along rows and columns.
+fn dilated(marked: &[bool], [width, height]: [u32; 2]) -> Vec<bool> {
+    let (width, height) = (width as usize, height as usize);
+    let mut rows = vec![false; marked.len()];
+    let mut all = vec![false; marked.len()];
+    for (i, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {
+        let (x, start) = (i % width, i - i % width);
+        rows[start + x.saturating_sub(NEAR_PX)..=start + (x + NEAR_PX).min(width - 1)].fill(true);
+    }
+    for (i, _) in rows.iter().enumerate().filter(|(_, marked)| **marked) {
+        let (x, y) = (i % width, i / width);
+        for y in y.saturating_sub(NEAR_PX)..=(y + NEAR_PX).min(height - 1) {
+            all[y * width + x] = true;
+        }
+    }
+    all
 }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, TrackerSpec};
+use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Solver, TrackerSpec};
 use crate::plan::MAX_KEYS;
 
 /// One value that no run can use.
@@ -200,6 +200,12 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.positive("quality.max_error_px", quality.max_error_px, "0.05 is the default");
     check.positive("quality.max_error_dn", quality.max_error_dn, "1 is the default");
     check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
+    check.at_least_one("quality.iterations", quality.iterations);
+    check.require(
+        quality.iterations == Auto::Auto || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
+        "quality.iterations",
+        || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
+    );
     check.at_least_one("quality.blur_samples", quality.blur_samples);
     check.at_least_one("quality.footprint_taps", quality.footprint_taps);
     check.require(quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)), "quality.key_frames", || {
@@ -293,6 +299,11 @@ mod tests {
             ("quality.preset", |s| s.quality.preset = Preset::Paper),
             ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
+            ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),
+            ("quality.iterations", |s| {
+                s.quality.iterations = Auto::Value(2);
+                s.quality.solver = Auto::Value(Solver::Rk2);
+            }),
             ("output.channels", |s| s.output.channels.clear()),
         ];
         for (key, edit) in cases {

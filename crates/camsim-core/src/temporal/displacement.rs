@@ -6,6 +6,9 @@ use glam::{DVec2, DVec3};
 /// The paper's step of rotation, degrees (section 8.4).
 pub const RK2_STEP_DEG: f64 = 2.5;
 
+/// Most steps of one time shift, so that hostile times and rates end: 28 turns.
+pub const RK2_MAX_STEPS: u32 = 4096;
+
 /// Motion of the camera, constant over the frame, in the axes of the camera (x right, y down, z forward).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
@@ -29,10 +32,12 @@ pub fn linear(uv: DVec2, inverse_depth: f64, twist: &Twist, dt_s: f64) -> DVec2 
     uv - image_rate(uv, inverse_depth, twist) * dt_s
 }
 
-/// Steps of at most `max_step_rad` of rotation that a time shift takes: `floor(|dt| |w| / step) + 1`, as the reference program counts.
+/// Steps of at most `max_step_rad` of rotation that a time shift takes: `floor(|dt| |w| / step) + 1`, as the reference program counts, at most
+/// [`RK2_MAX_STEPS`].
 #[must_use]
 pub fn rk2_steps(twist: &Twist, dt_s: f64, max_step_rad: f64) -> u32 {
-    ((dt_s.abs() * twist.rate_rad_s.length() / max_step_rad).floor() as u32).saturating_add(1)
+    let whole = (dt_s.abs() * twist.rate_rad_s.length() / max_step_rad).floor();
+    whole.min(f64::from(RK2_MAX_STEPS - 1)) as u32 + 1
 }
 
 /// As [`linear`], by steps of the two-point Runge-Kutta scheme (eq. 18, Heun's) with constant depth.

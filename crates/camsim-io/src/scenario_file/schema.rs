@@ -100,7 +100,8 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.max_error_px", Number),
     ("quality.max_error_dn", Number),
     ("quality.max_terrain_error_px", Number),
-    ("quality.solver", Word(&["auto", "reproject"])),
+    ("quality.solver", Word(&["auto", "linear", "rk2", "reproject"])),
+    ("quality.iterations", WholeOr(AUTO)),
     ("quality.blur_samples", WholeOr(AUTO)),
     ("quality.footprint_taps", WholeOr(AUTO)),
     ("quality.key_frames", WholeOr(AUTO)),
@@ -112,8 +113,6 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
 
 /// Words that the format knows and this version does not.
 pub(super) const LATER_WORDS: &[(&str, &str)] = &[
-    ("quality.solver", "linear"),
-    ("quality.solver", "rk2"),
     ("quality.solver", "oracle"),
     ("flight.format", "ulog"),
     ("flight.format", "gpx"),

@@ -1,0 +1,148 @@
+//! Rays against meshes: a tree of boxes over all triangles.
+
+use glam::DVec3;
+
+use super::{
+    Hit,
+    ray::{Bounds, Ray, meet},
+};
+use crate::scene::Mesh;
+
+/// Triangles of a leaf, at most.
+const LEAF: usize = 4;
+/// Boxes waiting while the tree is walked: its depth is at most log2 of the number of triangles.
+const STACK: usize = 64;
+
+#[derive(Clone, Copy, Debug)]
+struct Triangle {
+    corners: [DVec3; 3],
+    uv: [[f32; 2]; 3],
+    surface: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    bounds: Bounds,
+    /// Of a leaf the first triangle, else the second child; the first child follows its parent.
+    next: u32,
+    /// Triangles of a leaf, else 0.
+    count: u32,
+}
+
+/// All meshes of a scene.
+#[derive(Debug, Default)]
+pub(super) struct Meshes {
+    triangles: Vec<Triangle>,
+    nodes: Vec<Node>,
+}
+
+impl Meshes {
+    pub(super) fn new(meshes: &[Mesh]) -> Self {
+        let mut triangles = Vec::new();
+        for (surface, mesh) in (1..).zip(meshes) {
+            for of in mesh.indices.chunks_exact(3) {
+                let of = [of[0], of[1], of[2]];
+                if of.iter().any(|&corner| corner as usize >= mesh.vertices.len()) {
+                    continue;
+                }
+                let corners = of.map(|corner| {
+                    let [n, e, d] = mesh.vertices[corner as usize].position_m.map(f64::from);
+                    mesh.origin_ned_m + DVec3::new(n, e, d)
+                });
+                if corners.iter().all(|corner| corner.is_finite()) {
+                    triangles.push(Triangle { corners, uv: of.map(|corner| mesh.vertices[corner as usize].uv), surface });
+                }
+            }
+        }
+        let mut nodes = Vec::new();
+        if !triangles.is_empty() {
+            build(&mut triangles, 0, &mut nodes);
+        }
+        Self { triangles, nodes }
+    }
+
+    /// The first meeting before `limit`.
+    pub(super) fn first(&self, ray: &Ray, mut limit: f64) -> Option<Hit> {
+        let mut best = None;
+        let mut stack = [(0.0_f64, 0_u32); STACK];
+        let mut waiting = 0;
+        let root = self.nodes.first()?;
+        let mut current = ray.enter(root.bounds.low, root.bounds.high, limit).map(|_| 0_u32);
+        loop {
+            let Some(index) = current.take() else {
+                if waiting == 0 {
+                    return best;
+                }
+                waiting -= 1;
+                let (enter, index) = stack[waiting];
+                current = (enter < limit).then_some(index);
+                continue;
+            };
+            let node = &self.nodes[index as usize];
+            if node.count > 0 {
+                for triangle in &self.triangles[node.next as usize..(node.next + node.count) as usize] {
+                    if let Some((t, weights)) = meet(triangle.corners.map(|corner| ray.see(corner)), limit) {
+                        limit = t;
+                        best = Some(ray_hit(ray, t, weights, triangle.uv, triangle.surface));
+                    }
+                }
+                continue;
+            }
+            let enter = |child: u32| {
+                let bounds = &self.nodes[child as usize].bounds;
+                ray.enter(bounds.low, bounds.high, limit).map(|t| (t, child))
+            };
+            current = match (enter(index + 1), enter(node.next)) {
+                (Some(a), Some(b)) => {
+                    let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+                    if waiting < STACK {
+                        stack[waiting] = far;
+                        waiting += 1;
+                    }
+                    Some(near.1)
+                }
+                (a, b) => a.or(b).map(|(_, child)| child),
+            };
+        }
+    }
+}
+
+/// The hit of a ray on a triangle.
+pub(super) fn ray_hit(ray: &Ray, t: f64, weights: [f64; 3], uv: [[f32; 2]; 3], surface: u32) -> Hit {
+    let texture_uv = [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
+    Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, surface }
+}
+
+/// Halves at the middle triangle along the longest side of the box around the triangles' centres.
+fn build(triangles: &mut [Triangle], first: u32, nodes: &mut Vec<Node>) {
+    let mut bounds = Bounds::NONE;
+    let mut centres = Bounds::NONE;
+    for triangle in triangles.iter() {
+        triangle.corners.iter().for_each(|corner| bounds.include(*corner));
+        centres.include(centre(triangle));
+    }
+    let here = nodes.len();
+    nodes.push(Node { bounds: bounds.grown(), next: first, count: triangles.len() as u32 });
+    if triangles.len() <= LEAF {
+        return;
+    }
+    let size = centres.high - centres.low;
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let middle = triangles.len() / 2;
+    triangles.select_nth_unstable_by(middle, |a, b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+    let (left, right) = triangles.split_at_mut(middle);
+    build(left, first, nodes);
+    nodes[here].next = nodes.len() as u32;
+    nodes[here].count = 0;
+    build(right, first + middle as u32, nodes);
+}
+
+fn centre(triangle: &Triangle) -> DVec3 {
+    (triangle.corners[0] + triangle.corners[1] + triangle.corners[2]) / 3.0
+}

@@ -1,0 +1,328 @@
+//! Whole frames by the oracle: each sample of a pixel has its own place in the pixel's area and its own instant of the exposure.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::{FrameView, Look, Oracle};
+use crate::{
+    frame::{COORDS_CHANNELS, RenderedFrame, RowRecord},
+    noise::tail_table,
+    photometric::photometric,
+    pose::CameraPose,
+    scenario::Channel,
+    sequence::GrayImage,
+    temporal::IdealGeometry,
+};
+
+/// Steps of the additive sequences that fill 3 and 2 dimensions evenly: powers of 1/g, `g^4 = g + 1`, and of 1/g, `g^3 = g + 1` (Roberts).
+const EVEN_3D: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_3, 0.549_700_477_901_970_3];
+const EVEN_2D: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
+/// Samples of which one mean is formed for the estimate of the error.
+const BATCH: u32 = 8;
+/// Batches between two looks at the estimate.
+const BATCHES_A_CHECK: u32 = 4;
+
+/// What a frame of the oracle holds, and how far it is refined.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// [`Channel::Depth`] and [`Channel::Coords`] cost a ray a pixel; the others are always there.
+    pub channels: Vec<Channel>,
+    /// Samples of each pixel, at least; rounded up to 32.
+    pub min_samples: u32,
+    /// Samples of a pixel, at most.
+    pub max_samples: u32,
+    /// A pixel is finished when the standard error of its mean is below this, 1/255 of the linear range, in each channel.
+    pub tolerance_dn: f64,
+    /// Whether vignette, light, noise and saturation are applied; else the frame holds the light that arrives.
+    pub photometric: bool,
+    /// The ideal frame that the source coordinates of [`Channel::Coords`] refer to; without one they are 0.
+    pub key: Option<KeyFrame>,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { channels: vec![Channel::Color], min_samples: 32, max_samples: 1024, tolerance_dn: 0.25, photometric: true, key: None }
+    }
+}
+
+/// Pose and geometry of an ideal frame, for source coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeyFrame {
+    /// Its pose.
+    pub pose: CameraPose,
+    /// Its pixels.
+    pub ideal: IdealGeometry,
+}
+
+impl KeyFrame {
+    /// Where what a look sees lies in the ideal frame, pixels: its point, or for the sky its direction. Not finite on the horizon of the
+    /// key camera, and mirrored behind it.
+    #[must_use]
+    pub fn source_px(&self, look: &Look) -> DVec2 {
+        let seen = self.in_key(look);
+        self.ideal.principal_px + DVec2::new(self.ideal.focal_px.x * seen.x, self.ideal.focal_px.y * seen.y) / seen.z
+    }
+
+    /// The same in coordinates of the key camera.
+    pub(super) fn in_key(&self, look: &Look) -> DVec3 {
+        let ned = match &look.hit {
+            Some(hit) => hit.point_ned_m - self.pose.position_ned_m,
+            None => look.pose.ned_from_camera * look.uv.extend(1.0),
+        };
+        self.pose.ned_from_camera.conjugate() * ned
+    }
+}
+
+/// How a frame converged.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Convergence {
+    /// Pixels with a ray.
+    pub pixels: u64,
+    /// Samples of all of them.
+    pub samples: u64,
+    /// Pixels that stopped at `max_samples`.
+    pub unfinished: u64,
+    /// Root mean square of the estimated standard errors, 1/255 of the linear range (before noise).
+    pub rms_error_dn: f64,
+}
+
+/// One row of a frame.
+struct Row {
+    color: Vec<[f32; 4]>,
+    depth_m: Vec<f32>,
+    coords: Vec<[f32; COORDS_CHANNELS]>,
+    convergence: Convergence,
+    sum_of_squares: f64,
+}
+
+/// What all rows of a frame share.
+struct Job<'a> {
+    oracle: &'a Oracle,
+    view: FrameView<'a>,
+    frame: u64,
+    options: &'a RenderOptions,
+    noise_table: Vec<f32>,
+    truth: bool,
+}
+
+impl Oracle {
+    /// Renders one frame, on all threads; the same bytes whatever their number.
+    #[must_use]
+    pub fn render(&self, frame: u64, options: &RenderOptions) -> RenderedFrame {
+        self.render_reported(frame, options).0
+    }
+
+    /// As [`Oracle::render`], and how it converged.
+    #[must_use]
+    pub fn render_reported(&self, frame: u64, options: &RenderOptions) -> (RenderedFrame, Convergence) {
+        let size_px = self.sequence.scenario.camera.size_px;
+        let [depth, coords] = [Channel::Depth, Channel::Coords].map(|channel| options.channels.contains(&channel));
+        let job = Job { oracle: self, view: self.view(frame), frame, options, noise_table: tail_table(), truth: depth || coords };
+        let rows: Vec<Row> = (0..size_px[1]).into_par_iter().map(|y| job.row(y, size_px[0])).collect();
+        let mut convergence = Convergence::default();
+        let mut sum_of_squares = 0.0;
+        for row in &rows {
+            convergence.pixels += row.convergence.pixels;
+            convergence.samples += row.convergence.samples;
+            convergence.unfinished += row.convergence.unfinished;
+            sum_of_squares += row.sum_of_squares;
+        }
+        convergence.rms_error_dn = (sum_of_squares / convergence.pixels.max(1) as f64).sqrt();
+        let rendered = RenderedFrame {
+            index: frame,
+            stamp_ns: self.log_ns(self.stamp_s(frame)),
+            size_px,
+            color_rgba: rows.iter().flat_map(|row| row.color.as_flattened()).copied().collect(),
+            depth_m: depth.then(|| rows.iter().flat_map(|row| &row.depth_m).copied().collect()),
+            coords: coords.then(|| rows.iter().flat_map(|row| &row.coords).copied().collect()),
+            rows: self.row_records(frame),
+        };
+        (rendered, convergence)
+    }
+
+    /// Time, pose and velocity of each line of the readout at its mid-exposure.
+    #[must_use]
+    pub fn row_records(&self, frame: u64) -> Vec<RowRecord> {
+        let stamp_s = self.stamp_s(frame);
+        let record = |row| {
+            let t_s = stamp_s + self.clock.dt_line_s(row);
+            let CameraPose { position_ned_m, ned_from_camera } = self.sequence.path.pose(t_s);
+            let velocity_ned_m_s = self.sequence.path.velocity_ned(t_s);
+            RowRecord { row, t_mid_ns: self.log_ns(t_s), position_ned_m, ned_from_camera, velocity_ned_m_s }
+        };
+        (0..self.clock.lines()).map(record).collect()
+    }
+
+    fn log_ns(&self, t_s: f64) -> i64 {
+        self.sequence.epoch_ns.saturating_add((t_s * 1e9).round() as i64)
+    }
+}
+
+impl Job<'_> {
+    fn row(&self, y: u32, width: u32) -> Row {
+        let mut row = Row {
+            color: Vec::with_capacity(width as usize),
+            depth_m: Vec::new(),
+            coords: Vec::new(),
+            convergence: Convergence::default(),
+            sum_of_squares: 0.0,
+        };
+        let mut instants = Instants::new(self, y);
+        for x in 0..width {
+            // A pixel is valid where its centre has a ray.
+            let valid = self.view.ray([x, y], DVec2::ZERO).is_some();
+            if valid {
+                let pixel = self.pixel([x, y], &mut instants);
+                row.convergence.pixels += 1;
+                row.convergence.samples += u64::from(pixel.samples);
+                row.convergence.unfinished += u64::from(!pixel.finished);
+                row.sum_of_squares += pixel.error_dn * pixel.error_dn;
+                let [r, g, b] = self.exposed(pixel.color, [x, y]);
+                row.color.push([r, g, b, 1.0]);
+            } else {
+                row.color.push([0.0; 4]);
+            }
+            if self.truth {
+                let look = if valid { self.view.look([x, y], DVec2::ZERO, 0.0) } else { None };
+                row.depth_m.push(look.and_then(|look| look.hit).map_or(0.0, |hit| hit.depth_m as f32));
+                row.coords.push(look.map_or([0.0; COORDS_CHANNELS], |look| self.coords([x, y], &look)));
+            }
+        }
+        row
+    }
+
+    /// Mean light over area and exposure.
+    fn pixel(&self, [x, y]: [u32; 2], instants: &mut Instants<'_>) -> PixelMean {
+        let options = self.options;
+        let [shift_x, shift_y, _] = shifts(u64::from(y) << 32 | u64::from(x));
+        let steps = if instants.exposure_s > 0.0 { [EVEN_3D[0], EVEN_3D[1]] } else { EVEN_2D };
+        let max_batches = options.max_samples.div_ceil(BATCH).max(BATCHES_A_CHECK);
+        let min_batches = options.min_samples.div_ceil(BATCH).clamp(BATCHES_A_CHECK, max_batches);
+        let (mut sum, mut samples) = (DVec3::ZERO, 0_u32);
+        let (mut mean_of_means, mut spread, mut means) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        let mut error_dn = 0.0;
+        for batch in 0..max_batches {
+            let (mut part, mut count) = (DVec3::ZERO, 0_u32);
+            for i in batch * BATCH..(batch + 1) * BATCH {
+                let place = DVec2::new((shift_x + f64::from(i) * steps[0]).fract(), (shift_y + f64::from(i) * steps[1]).fract());
+                // At the border of what the lens shows, the part of the area that it does show.
+                let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
+                let pose = instants.pose(x, i);
+                part += self.oracle.color(uv, self.view.hit(&pose, uv).as_ref());
+                count += 1;
+            }
+            if count == 0 {
+                continue;
+            }
+            sum += part;
+            samples += count;
+            means += 1.0;
+            let mean = part / f64::from(count);
+            let before = mean - mean_of_means;
+            mean_of_means += before / means;
+            spread += before * (mean - mean_of_means);
+            let done = batch + 1;
+            if means > 1.0 && done >= min_batches && done % BATCHES_A_CHECK == 0 {
+                error_dn = 255.0 * (spread.max_element() / (means * (means - 1.0))).sqrt();
+                if error_dn < options.tolerance_dn {
+                    return PixelMean { color: sum / f64::from(samples), samples, error_dn, finished: true };
+                }
+            }
+        }
+        PixelMean { color: sum / f64::from(samples.max(1)), samples, error_dn, finished: false }
+    }
+
+    fn exposed(&self, color: DVec3, pixel: [u32; 2]) -> [f32; 3] {
+        let color = color.as_vec3().to_array();
+        if !self.options.photometric {
+            return color;
+        }
+        let sequence = &self.oracle.sequence;
+        let spec = &sequence.scenario.camera.photometric;
+        let weight = sequence.vignette.as_ref().map_or(1.0, |map| {
+            let value = vignette(map, pixel, sequence.scenario.camera.size_px);
+            let [black, full] = spec.vignette_thresholds;
+            match value {
+                value if value < black => 0.0,
+                value if full > 0.0 => (value / full).min(1.0),
+                _ => 1.0,
+            }
+        });
+        photometric(spec, color, weight as f32, pixel, self.frame as u32, sequence.scenario.seed, &self.noise_table)
+    }
+
+    fn coords(&self, pixel: [u32; 2], look: &Look) -> [f32; COORDS_CHANNELS] {
+        let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(look));
+        let dt_s = self.oracle.clock.dt_s(pixel);
+        let point = look.hit.map_or(DVec3::ZERO, |hit| hit.point_ned_m);
+        [look.uv.x, look.uv.y, source_px.x, source_px.y, dt_s, point.x, point.y, point.z].map(|value| value as f32)
+    }
+}
+
+/// A pixel's mean and how it was reached.
+struct PixelMean {
+    color: DVec3,
+    samples: u32,
+    error_dn: f64,
+    finished: bool,
+}
+
+/// Poses at the instants of a row's samples. Where rows are read at once all pixels of a row share the instants, and each pose is found once.
+struct Instants<'a> {
+    job: &'a Job<'a>,
+    y: u32,
+    exposure_s: f64,
+    shift: f64,
+    shared: Option<Vec<CameraPose>>,
+}
+
+impl<'a> Instants<'a> {
+    fn new(job: &'a Job<'a>, y: u32) -> Self {
+        let exposure_s = job.oracle.clock.exposure_s();
+        let shared = job.oracle.clock.reads_rows().then(Vec::new);
+        Self { job, y, exposure_s, shift: shifts(u64::from(y))[2], shared }
+    }
+
+    /// At sample `i` of pixel `x`.
+    fn pose(&mut self, x: u32, i: u32) -> CameraPose {
+        let at = |i: u32, shift: f64| {
+            let phase = if self.exposure_s > 0.0 { (shift + f64::from(i) * EVEN_3D[2]).fract() - 0.5 } else { 0.0 };
+            self.job.oracle.sequence.path.pose(self.job.view.mid_s([x, self.y]) + phase * self.exposure_s)
+        };
+        let Some(shared) = &mut self.shared else { return at(i, self.shift) };
+        let i = if self.exposure_s > 0.0 { i } else { 0 };
+        while shared.len() <= i as usize {
+            let next = at(shared.len() as u32, self.shift);
+            shared.push(next);
+        }
+        shared[i as usize]
+    }
+}
+
+/// Three numbers in 0..1 that look random (splitmix64).
+fn shifts(key: u64) -> [f64; 3] {
+    let mut state = key;
+    std::array::from_fn(|_| {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    })
+}
+
+/// The vignette map at a pixel: the map covers the picture, edge to edge; bilinear between its pixel centres, held beyond the outer ones.
+fn vignette(map: &GrayImage, pixel: [u32; 2], size_px: [u32; 2]) -> f64 {
+    let [columns, rows] = map.size_px;
+    let axis = |k: usize, of: u32| {
+        let at = (f64::from(pixel[k]) + 0.5) / f64::from(size_px[k]) * f64::from(of) - 0.5;
+        let at = at.max(0.0).min(f64::from(of) - 1.0);
+        let low = at as u32;
+        (low, (low + 1).min(of - 1), at - f64::from(low))
+    };
+    let ((x0, x1, tx), (y0, y1, ty)) = (axis(0, columns), axis(1, rows));
+    let at = |x: u32, y: u32| map.values.get((y * columns + x) as usize).map_or(0.0, |value| f64::from(*value));
+    let top = at(x0, y0) * (1.0 - tx) + at(x1, y0) * tx;
+    let bottom = at(x0, y1) * (1.0 - tx) + at(x1, y1) * tx;
+    top * (1.0 - ty) + bottom * ty
+}
