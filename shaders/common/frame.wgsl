@@ -42,8 +42,8 @@ struct Frame {
     edge_samples: u32,
     // Largest rotation of a step of the rk2 solver.
     rk2_step_rad: f32,
-    pad1: u32,
-    pad2: u32,
+    // p1 p2 of the lens, for the lens inverse of the paper preset.
+    lens_tangential: vec2<f32>,
     // Mid-window camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
@@ -53,6 +53,10 @@ struct Frame {
     // its length in w.
     key_velocity_m_s: vec4<f32>,
     key_rate_rad_s: vec4<f32>,
+    // k1 k2 k3 of the lens.
+    lens_radial: vec4<f32>,
+    // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0 = clear).
+    linear_fog: vec4<f32>,
     // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
     keys: u32,
     key_rows: u32,

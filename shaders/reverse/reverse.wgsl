@@ -6,10 +6,12 @@
 #import reverse/ideal_frame.wgsl
 #import <slot:keys>
 #import <slot:ray>
+#import <slot:depth>
 #import <slot:temporal_inverse>
 #import <slot:gather>
 #import <slot:edges>
 #import reverse/photometric.wgsl
+#import <slot:color>
 #import <slot:emit>
 
 @compute @workgroup_size(8, 8)
@@ -33,5 +35,5 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
         emit_invalid(pixel);
         return;
     }
-    emit(pixel, ray, photometric(pixel, gathered.color.rgb, weight));
+    emit(pixel, ray, output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)));
 }

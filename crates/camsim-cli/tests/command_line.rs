@@ -194,7 +194,7 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &scenario, "--outputs", "colour"], "coords"),
         (vec!["render", &scenario, "--format", "none,png"], "stands alone"),
         (vec!["render", &scenario, "--backend", "reference"], "not in this version"),
-        (vec!["render", &scenario, "--preset", "paper"], "quality.preset"),
+        (vec!["render", &scenario, "--preset", "paper", "--set", "quality.solver=linear"], "quality.solver"),
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),

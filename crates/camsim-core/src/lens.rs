@@ -14,6 +14,7 @@ pub use crate::scenario::LensModel;
 mod brown_conrady;
 mod fold;
 mod kannala_brandt;
+pub mod paper;
 mod pinhole;
 mod radial_table;
 

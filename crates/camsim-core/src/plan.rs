@@ -13,7 +13,7 @@ use crate::{
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
-    scenario::Channel,
+    scenario::{Channel, Preset},
     scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
@@ -27,12 +27,14 @@ mod forced;
 mod keys;
 mod lines;
 mod motion;
+pub mod paper;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
+pub use paper::LinearFog;
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
@@ -75,6 +77,8 @@ pub enum RayStage {
     Pinhole,
     /// A lens map, computed once per lens and zoom value.
     LensMap,
+    /// The paper's Gauss-Newton inverse, for each pixel of each frame.
+    GaussNewton,
 }
 
 /// How a line's own instant is taken back to the ideal frame's.
@@ -142,6 +146,8 @@ pub struct Skip {
 pub struct FramePlan {
     /// Frame number.
     pub frame: u64,
+    /// Whose methods.
+    pub preset: Preset,
     /// Stamp t_i, path time, seconds.
     pub stamp_s: f64,
     /// First and last instant that the frame sees, path time, seconds.
@@ -174,6 +180,8 @@ pub struct FramePlan {
     pub edges: EdgeStage,
     /// Most footprint taps an axis.
     pub max_taps: u32,
+    /// Fog after the gather (the paper's); otherwise it is in the ideal frame.
+    pub linear_fog: Option<LinearFog>,
     /// Whether depth and coordinates are wanted beside the picture.
     pub truth: bool,
     /// What the choices rest on.
@@ -272,30 +280,35 @@ impl Planner {
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
         let key_pose = path.pose(key_s);
-        let key_twist = Twist {
-            velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s),
-            rate_rad_s: path.rate_camera(key_s),
-        };
+        let key_twist =
+            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
+        let is_paper = quality.preset == Preset::Paper;
         let geometry = |keys: &[KeyFrame]| {
             let displaced = demanded.map(|stage| (stage, key_twist));
             bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene, displaced)
         };
         let one_key = keys::spread(path, window_s, 1);
-        let mut ideal = geometry(&one_key);
+        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key) };
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
         let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
         let mut skipped = Vec::new();
-        let ray = ray_stage(&reach, &mut skipped);
-        let temporal = demanded
-            .unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
-        let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
-        let blur = forced::blur_stage(temporal, blur, quality, &motion);
-        let edges =
-            edges::edge_stage(&self.outline, scene, &key_pose, &ideal, motion.travel_m, blur, quality, self.max_side_px, &mut skipped);
+        let ray = if is_paper { paper::ray_stage(&reach.camera) } else { ray_stage(&reach, &mut skipped) };
+        let temporal =
+            demanded.unwrap_or_else(|| motion::temporal_stage(&motion, quality, reach.camera.focal_px.max_element(), &mut skipped));
+        let (blur, edges) = if is_paper {
+            skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
+            (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
+        } else {
+            let blur = motion::blur_stage(&motion, quality, path, &self.shutter, &mut skipped);
+            let blur = forced::blur_stage(temporal, blur, quality, &motion);
+            let travel_m = motion.travel_m;
+            let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
+            (blur, edges)
+        };
         let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(path, window_s, count);
@@ -309,6 +322,7 @@ impl Planner {
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
+            preset: quality.preset,
             stamp_s,
             window_s,
             extrapolated: window_s[0] < span_s.0 || window_s[1] > span_s.1,
@@ -324,7 +338,8 @@ impl Planner {
             temporal,
             blur,
             edges,
-            max_taps: quality.footprint_taps.value().unwrap_or(4).max(1),
+            max_taps: if is_paper { 1 } else { quality.footprint_taps.value().unwrap_or(4).max(1) },
+            linear_fog: if is_paper { paper::fog(scene) } else { None },
             truth: self.truth,
             motion,
             skipped,

@@ -191,7 +191,7 @@ pub struct QualitySpec {
     pub solver: Auto<Solver>,
     /// Depth look-ups of `reproject`.
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel.
+    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure.
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel.
     pub footprint_taps: Auto<u32>,
@@ -222,7 +222,9 @@ pub enum Preset {
     /// The cheapest methods that keep the tolerances.
     #[default]
     Default,
-    /// The paper's own methods and approximations.
+    /// The paper's own methods and approximations, as a base to measure against; [`crate::plan::paper`] lists them. It fixes the solver
+    /// (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the samples of an exposure (100), and the tolerances choose
+    /// nothing but the terrain's level of detail.
     Paper,
 }
 

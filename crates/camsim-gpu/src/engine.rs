@@ -20,7 +20,7 @@ use wgpu::util::DeviceExt;
 
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
-    ideal::{IdealPass, IdealSlot, IdealTarget},
+    ideal::{IdealPass, IdealSlot, IdealTarget, STORED_FORMAT},
     layout::{FrameUniforms, Truth},
     reverse::{PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
     shaders::ComposeError,
@@ -110,7 +110,8 @@ impl Engine {
             gpu.check_storage("the output frame's depth and coords", bytes, "reduce camera.size_px or leave them out of output.channels")?;
         }
         let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
-        let ideal_pass = IdealPass::new(gpu)?;
+        let preset = sequence.scenario.quality.preset;
+        let ideal_pass = IdealPass::new(gpu, preset)?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
         let camera = &sequence.scenario.camera;
         let weights = match &sequence.vignette {
@@ -284,8 +285,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A and inverse depth (1/m),
-    /// row-major. For tests and for looking at stages one by one.
+    /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A (with the paper preset sRGB
+    /// values as stored) and inverse depth (1/m), row-major. For tests and for looking at stages one by one.
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.
@@ -293,11 +294,17 @@ impl Session<'_> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
         let target = &self.targets[drawn.target];
         let [width, height] = drawn.ideal.size_px;
-        let color = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height)?;
+        let color: Vec<f32> = if target.color.format() == STORED_FORMAT {
+            let bytes = read_texture::<[u8; 4]>(&self.engine.gpu, &target.color, width, height)?;
+            bytes.iter().flatten().map(|v| f32::from(*v) / 255.0).collect()
+        } else {
+            let halves = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height)?;
+            halves.iter().flatten().map(|v| v.to_f32()).collect()
+        };
         let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height)?;
         self.engine.check()?;
         let near_m = camsim_core::plan::NEAR_M as f32;
-        Ok(Some((drawn.ideal, color.iter().flatten().map(|v| v.to_f32()).collect(), depth.iter().map(|d| d / near_m).collect())))
+        Ok(Some((drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())))
     }
 
     /// Every pass of a frame, in order.
@@ -368,7 +375,7 @@ impl Session<'_> {
                 let oldest = self.targets.iter().position(alike).unwrap_or_default();
                 self.targets.remove(oldest);
             }
-            self.targets.push(IdealTarget::new(gpu, size_px, plan.edges));
+            self.targets.push(IdealTarget::new(gpu, size_px, plan.edges, plan.preset));
             self.targets.len() - 1
         });
         let sequence = self.planner.sequence();
@@ -417,7 +424,7 @@ impl Session<'_> {
         let bindings = ReverseBindings {
             frame: &slot.frame,
             noise_table: &self.noise_table,
-            color: &view(&target.color),
+            color: &target.color_view(),
             depth: &view(&target.depth),
             fine: target.fine.as_ref(),
             poses: &slot.poses,

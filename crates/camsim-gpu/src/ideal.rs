@@ -3,6 +3,7 @@
 use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
+    scenario::Preset,
     scene::{LodSelection, Scene, select_lod},
     temporal::IdealGeometry,
 };
@@ -22,6 +23,10 @@ use fine::{ResolvePass, scale_of, texture};
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+/// Colour format of the paper preset's ideal frame: the device encodes on writing; the gather reads what is stored ([`STORED_VIEW`]).
+pub const STORED_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+/// How the paper preset's gather sees it.
+pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth format of the ideal frame: near / z.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Distance between the placements of two meshes in their buffer.
@@ -57,7 +62,7 @@ impl IdealTarget {
 
     /// Allocates.
     #[must_use]
-    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], edges: EdgeStage) -> Self {
+    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], edges: EdgeStage, preset: Preset) -> Self {
         let fine = scale_of(edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
         // Resolved colour and depth are written by a compute pass.
         let (depth_format, written) = match fine {
@@ -65,9 +70,26 @@ impl IdealTarget {
             None => (DEPTH_FORMAT, wgpu::TextureUsages::RENDER_ATTACHMENT),
         };
         let usage = written | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let color = texture(gpu, "camsim.ideal.color", allocated_px, COLOR_FORMAT, 1, usage);
+        let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(preset), 1, usage);
         let depth = texture(gpu, "camsim.ideal.depth", allocated_px, depth_format, 1, usage);
         Self { allocated_px, color, depth, fine }
+    }
+
+    /// The colour as the gather reads it.
+    #[must_use]
+    pub fn color_view(&self) -> wgpu::TextureView {
+        let format = (self.color.format() == STORED_FORMAT).then_some(STORED_VIEW);
+        // A storage usage of the texture would not be legal for a view of another format, and the gather needs none.
+        let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
+        self.color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() })
+    }
+}
+
+/// Format that surfaces are drawn to with one sample a pixel.
+fn color_format(preset: Preset) -> wgpu::TextureFormat {
+    match preset {
+        Preset::Default => COLOR_FORMAT,
+        Preset::Paper => STORED_FORMAT,
     }
 }
 
@@ -111,7 +133,7 @@ impl IdealPass {
     ///
     /// # Errors
     /// Faults of the shader files.
-    pub fn new(gpu: &GpuContext) -> Result<Self, ComposeError> {
+    pub fn new(gpu: &GpuContext, preset: Preset) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
@@ -131,13 +153,13 @@ impl IdealPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
         };
-        let pipelines = |samples| -> Result<_, ComposeError> {
+        let pipelines = |samples, format| -> Result<_, ComposeError> {
             Ok(SurfacePipelines {
-                terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples)?,
-                mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples)?,
+                terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples, format)?,
+                mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples, format)?,
             })
         };
-        let (plain, fine) = (pipelines(1)?, pipelines(FINE_SAMPLES)?);
+        let (plain, fine) = (pipelines(1, color_format(preset))?, pipelines(FINE_SAMPLES, COLOR_FORMAT)?);
         Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
     }
 
@@ -229,7 +251,7 @@ impl IdealPass {
         let mut middle_lod = LodSelection::default();
         for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
-            gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(&key.pose, &plan.ideal, base_ned_m, scene)));
+            gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let first_row = key_rows(&plan.ideal) * k as u32 * scale;
             pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(0, first_row, width, height);
@@ -327,12 +349,15 @@ impl IdealPass {
 }
 
 /// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.
-fn ideal_camera(pose: &CameraPose, ideal: &IdealGeometry, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
+fn ideal_camera(plan: &FramePlan, pose: &CameraPose, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
+    let ideal = &plan.ideal;
     let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
     let row = |i: usize| camera_from_ned.row(i).as_vec3().extend(0.0).to_array();
     let [width, height] = ideal.size_px.map(f64::from);
     let (f, c) = (ideal.focal_px, ideal.principal_px);
-    let fog = scene.fog_visibility_m.map_or(0.0, |visibility_m| 3.912 / visibility_m);
+    // The paper's fog comes after the gather.
+    let visibility_m = scene.fog_visibility_m.filter(|_| plan.linear_fog.is_none());
+    let fog = visibility_m.map_or(0.0, |visibility_m| 3.912 / visibility_m);
     let [r, g, b] = scene.sky_linear;
     IdealCamera {
         clip_scale: [(2.0 * f.x / width) as f32, (-2.0 * f.y / height) as f32],
@@ -372,6 +397,7 @@ fn pipeline(
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
+    format: wgpu::TextureFormat,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
     let module = shaders::module(&gpu.device, file, file, &[])?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
@@ -403,7 +429,7 @@ fn pipeline(
             module: &module,
             entry_point: Some("fragment"),
             compilation_options,
-            targets: &[Some(COLOR_FORMAT.into())],
+            targets: &[Some(format.into())],
         }),
         multiview_mask: None,
         cache: None,

@@ -7,8 +7,8 @@ use std::collections::{HashMap, hash_map::Entry};
 
 use camsim_core::{
     photometric::is_mono,
-    plan::{EdgeStage, FramePlan, NEAR_M, RayStage, TemporalStage, table_shape},
-    scenario::Scenario,
+    plan::{EdgeStage, FramePlan, LinearFog, NEAR_M, RayStage, TemporalStage, table_shape},
+    scenario::{Preset, Scenario},
     shutter::LinesAxis,
     temporal::displacement::RK2_STEP_DEG,
 };
@@ -54,6 +54,8 @@ pub struct PipelineKey {
     pub edges: bool,
     /// Depth and coordinates beside the picture.
     pub truth: bool,
+    /// The paper preset: stored values, straight blur, nearest depth.
+    pub paper: bool,
 }
 
 impl PipelineKey {
@@ -74,6 +76,7 @@ impl PipelineKey {
             keys: plan.keys.len() > 1,
             edges: plan.edges != EdgeStage::None,
             truth: plan.truth,
+            paper: plan.preset == Preset::Paper,
         }
     }
 
@@ -95,9 +98,14 @@ impl PipelineKey {
                         if several && !parallax {
                             continue;
                         }
-                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, keys: several, edges, truth }));
+                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, keys: several, edges, truth, paper: false }));
                     }
                 }
+            }
+        }
+        for ray in [RayStage::Pinhole, RayStage::GaussNewton] {
+            for blur in [false, true] {
+                keys.extend([false, true].map(|truth| Self { ray, temporal: Rk2, blur, keys: false, edges: false, truth, paper: true }));
             }
         }
         keys
@@ -105,10 +113,11 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 6] {
+    pub fn slots(&self) -> [Slot; 8] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
+            RayStage::GaussNewton => "reverse/ray/gauss_newton.wgsl",
         };
         let temporal = match self.temporal {
             TemporalKind::Identity => "reverse/temporal_inverse/identity.wgsl",
@@ -118,10 +127,27 @@ impl PipelineKey {
             TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
         };
         let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
-        let gather = if self.blur { "reverse/gather/blur.wgsl" } else { "reverse/gather/sharp.wgsl" };
+        let gather = match (self.blur, self.paper) {
+            (false, _) => "reverse/gather/sharp.wgsl",
+            (true, false) => "reverse/gather/blur.wgsl",
+            (true, true) => "reverse/gather/straight.wgsl",
+        };
+        let (depth, color) = match self.paper {
+            false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
+            true => ("reverse/depth/nearest.wgsl", "reverse/color/stored.wgsl"),
+        };
         let edges = if self.edges { "reverse/edges/supersampled.wgsl" } else { "reverse/edges/none.wgsl" };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
-        [("keys", keys), ("ray", ray), ("temporal_inverse", temporal), ("gather", gather), ("edges", edges), ("emit", emit)]
+        [
+            ("keys", keys),
+            ("ray", ray),
+            ("depth", depth),
+            ("temporal_inverse", temporal),
+            ("gather", gather),
+            ("edges", edges),
+            ("color", color),
+            ("emit", emit),
+        ]
     }
 }
 
@@ -284,7 +310,7 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
         ]);
     }
     let lens = match key.ray {
-        RayStage::Pinhole => Vec::new(),
+        RayStage::Pinhole | RayStage::GaussNewton => Vec::new(),
         RayStage::LensMap => vec![entry(0, texture(wgpu::TextureSampleType::Float { filterable: false }))],
     };
     let mut out = vec![entry(0, storage(false))];
@@ -301,6 +327,8 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
+    let lens = |i: usize| plan.camera.lens.coefficients().get(i).map_or(0.0, |&k| k as f32);
+    let linear_fog = plan.linear_fog.map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
     let (edge_scale, edge_samples) = match plan.edges {
         EdgeStage::None => (1, 0),
         EdgeStage::Supersampled { scale, samples } => (scale, samples),
@@ -342,6 +370,9 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
+        lens_radial: [lens(0), lens(1), lens(4), 0.0],
+        lens_tangential: [lens(2), lens(3)],
+        linear_fog,
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
         key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),
         ..FrameUniforms::default()
@@ -364,6 +395,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 88);
+        assert_eq!(PipelineKey::all().len(), 96);
     }
 }

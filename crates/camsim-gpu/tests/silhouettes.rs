@@ -12,7 +12,7 @@ use camsim_core::{
 use camsim_gpu::engine::Finished;
 use common::{
     engine, pattern,
-    rays::{black_ground_and_roof, expected, linear_psnr, roof},
+    rays::{black_ground_and_roof, expected, fine_samples, linear_psnr, roof},
     render, scenario, sequence, steady,
 };
 use glam::{DVec2, DVec3};

@@ -108,12 +108,21 @@ fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     return Gathered(vec4<f32>(sum / f32(frame.edge_samples), 1.0), plain.inside);
 }
 
-fn seen_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Seen {
+fn seen_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
     use_key_of_line(pixel);
-    if (!near_edge(ray.uv, pose_mid(pixel))) {
-        return smooth_at_phase(pixel, ray, phase);
+    if (!near_edge(ray.uv, pose_along(pixel, phase + 0.5))) {
+        return smooth_px_at_phase(pixel, ray, phase);
     }
     let found = first_surface_of_keys(pixel, ray.uv, phase + 0.5);
+    return reference_px(found.at_px, found.in_key);
+}
+
+fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
+    use_key_of_line(pixel);
+    if (!near_edge(ray.uv, pose_mid(pixel))) {
+        return smooth_mid(pixel, ray);
+    }
+    let found = first_surface_of_keys(pixel, ray.uv, 0.5);
     return seen_from(found.at_px, found.in_line, found.in_key);
 }
 

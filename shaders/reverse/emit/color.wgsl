@@ -1,4 +1,6 @@
 // Only the picture is wanted.
+const EMITS_RAYS: bool = false;
+
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
 
 fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {

@@ -1,4 +1,6 @@
 // Picture, depth and coordinates.
+const EMITS_RAYS: bool = true;
+
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
 
 struct Truth {
@@ -18,8 +20,8 @@ fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {
     let i = pixel.y * frame.size_px.x + pixel.x;
     out_color[i] = vec4<f32>(color, 1.0);
     var truth = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
-    truth.source_px = seen_at_phase(pixel, ray, frame.coords_phase).reference_px;
-    let mid = seen_at_phase(pixel, ray, 0.0);
+    truth.source_px = seen_px_at_phase(pixel, ray, frame.coords_phase);
+    let mid = seen_mid(pixel, ray);
     if (mid.inverse_depth > 0.0 && mid.point.w > 0.0) {
         truth.depth_m = 1.0 / mid.inverse_depth;
         // On the key ray of the source, at the depth found there: no absolute pose is differenced in f32.

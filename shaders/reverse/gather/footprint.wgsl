@@ -1,9 +1,5 @@
 // Area of an output pixel in the ideal frame: a grid of taps where the lens minifies.
-struct Gathered {
-    // Linear R G B; alpha is 1, or less where the samples met a silhouette.
-    color: vec4<f32>,
-    inside: bool,
-}
+#import reverse/gather/interface.wgsl
 
 struct Footprint {
     // Ideal pixels per output pixel along x and y.

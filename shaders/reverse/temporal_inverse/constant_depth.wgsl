@@ -1,5 +1,5 @@
 // The paper's displacement (eqs. 10 to 18): the camera keeps the twist that it has at the key instant, and a pixel keeps the depth that
-// the ideal frame has at its own place. What fills the slot says how `displaced` integrates that.
+// the ideal frame has at its own place (the `depth` slot says how it is read). What fills the slot says how `displaced` integrates that.
 #import reverse/temporal_inverse/interface.wgsl
 #import reverse/temporal_inverse/line_entry.wgsl
 
@@ -31,7 +31,7 @@ fn image_rate(uv: vec2<f32>, w: f32) -> vec2<f32> {
 }
 
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
-    let found = inverse_depth(frame.ideal_focal_px * uv + frame.ideal_principal_px);
+    let found = constant_depth(frame.ideal_focal_px * uv + frame.ideal_principal_px);
     let at_px = frame.ideal_focal_px * displaced(uv, found.value, pose.dt_s) + frame.ideal_principal_px;
     return Source(at_px, found.value, found.spread, inside_ideal(at_px));
 }

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{BlurStage, EdgeStage, FramePlan, Motion, RayStage, Skip, TemporalStage};
-use crate::temporal::displacement::RK2_STEP_DEG;
+use crate::{scenario::Preset, temporal::displacement::RK2_STEP_DEG};
 
 /// The plan's figures, ready to serialise.
 #[derive(Clone, Debug, Serialize)]
@@ -68,7 +68,8 @@ impl FramePlan {
         }
         let rays = match self.edges {
             EdgeStage::None => {
-                passes.push(format!("ideal: {frames}{width}x{height} px rgba16float + depth32float (reversed)"));
+                let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
+                passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed)"));
                 String::new()
             }
             EdgeStage::Supersampled { scale, samples } => {
@@ -81,7 +82,11 @@ impl FramePlan {
                 format!(", {samples} rays a pixel at silhouettes")
             }
         };
-        let ray = if self.ray == RayStage::LensMap { "lens map" } else { "pinhole ray" };
+        let ray = match self.ray {
+            RayStage::Pinhole => "pinhole ray",
+            RayStage::LensMap => "lens map",
+            RayStage::GaussNewton => "Gauss-Newton lens inverse",
+        };
         let temporal = match self.temporal {
             TemporalStage::Identity => "no motion".to_owned(),
             TemporalStage::Rotation => "rotation per line".to_owned(),
@@ -91,6 +96,7 @@ impl FramePlan {
         };
         let gather = match self.blur {
             None => "sharp".to_owned(),
+            Some(blur) if self.preset == Preset::Paper => format!("straight blur of {} samples, ends included", blur.max_samples),
             Some(blur) => format!("blur with {} nodes, {} samples a px", blur.nodes, blur.samples_per_px),
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };

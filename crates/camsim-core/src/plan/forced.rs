@@ -1,10 +1,10 @@
-//! What `quality.solver` and `quality.iterations` demand instead of leaving it to the planner.
+//! What `quality.preset`, `quality.solver` and `quality.iterations` demand instead of leaving it to the planner.
 
 use glam::DVec2;
 
 use super::{BlurStage, Motion, TemporalStage};
 use crate::{
-    scenario::{QualitySpec, Solver},
+    scenario::{Preset, QualitySpec, Solver},
     temporal::displacement::{self, RK2_STEP_DEG, Twist},
 };
 
@@ -12,6 +12,9 @@ use crate::{
 ///
 /// `reproject` alone still leaves out what a frame does not need (rotation only, nothing moves); a number of iterations does not.
 pub(super) fn temporal_stage(quality: &QualitySpec) -> Option<TemporalStage> {
+    if quality.preset == Preset::Paper {
+        return Some(TemporalStage::Rk2);
+    }
     match (quality.solver.value(), quality.iterations.value()) {
         (Some(Solver::Linear), _) => Some(TemporalStage::Linear),
         (Some(Solver::Rk2), _) => Some(TemporalStage::Rk2),

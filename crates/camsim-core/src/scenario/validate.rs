@@ -194,9 +194,9 @@ fn check_scene(check: &mut Check, scenario: &Scenario) {
 
 fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     let quality = &scenario.quality;
-    check.require(quality.preset == Preset::Default, "quality.preset", || {
-        "\"paper\" is not supported by this version; leave it out or write \"default\"".into()
-    });
+    if quality.preset == Preset::Paper {
+        check_paper(check, scenario);
+    }
     check.positive("quality.max_error_px", quality.max_error_px, "0.05 is the default");
     check.positive("quality.max_error_dn", quality.max_error_dn, "1 is the default");
     check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
@@ -216,12 +216,31 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     });
 }
 
+/// What the paper's methods cannot do, and keys that they leave nothing to.
+fn check_paper(check: &mut Check, scenario: &Scenario) {
+    let (quality, camera) = (&scenario.quality, &scenario.camera);
+    let coefficients = camera.zoom.iter().map(|zoom| &zoom.coefficients).chain([&camera.lens.coefficients]);
+    let rational = coefficients.flat_map(|k| k.iter().skip(5)).any(|&k| k != 0.0);
+    check.require(camera.lens.model != LensModel::KannalaBrandt && !rational, "quality.preset", || {
+        "\"paper\" knows pinhole and brown-conrady lenses with k1 k2 p1 p2 k3 only; write \"default\"".into()
+    });
+    check.require(!matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Reproject)), "quality.solver", || {
+        "is rk2 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
+    check.require(quality.iterations == Auto::Auto, "quality.iterations", || {
+        "does not go with quality.preset = \"paper\", which looks the depth up once; leave it out".into()
+    });
+    check.require(matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)), "quality.footprint_taps", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{FlightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{FlightSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
 
     fn good() -> Scenario {
         Scenario {
@@ -296,7 +315,26 @@ mod tests {
             ("scene", |s| s.scene.pattern = None),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
-            ("quality.preset", |s| s.quality.preset = Preset::Paper),
+            ("quality.preset", |s| {
+                s.quality.preset = Preset::Paper;
+                s.camera.lens.model = LensModel::KannalaBrandt;
+            }),
+            ("quality.preset", |s| {
+                s.quality.preset = Preset::Paper;
+                s.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.2] };
+            }),
+            ("quality.solver", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.solver = Auto::Value(Solver::Linear);
+            }),
+            ("quality.iterations", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.iterations = Auto::Value(2);
+            }),
+            ("quality.footprint_taps", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.footprint_taps = Auto::Value(2);
+            }),
             ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),

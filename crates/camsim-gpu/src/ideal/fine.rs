@@ -2,7 +2,7 @@
 
 use camsim_core::plan::EdgeStage;
 
-use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget};
+use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW};
 use crate::{
     context::GpuContext,
     shaders::{self, ComposeError},
@@ -52,7 +52,7 @@ pub(super) fn texture(
         dimension: wgpu::TextureDimension::D2,
         format,
         usage,
-        view_formats: &[],
+        view_formats: if format == STORED_FORMAT { &[STORED_VIEW] } else { &[] },
     })
 }
 

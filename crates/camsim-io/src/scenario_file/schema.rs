@@ -112,12 +112,8 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
 ];
 
 /// Words that the format knows and this version does not.
-pub(super) const LATER_WORDS: &[(&str, &str)] = &[
-    ("quality.solver", "oracle"),
-    ("flight.format", "ulog"),
-    ("flight.format", "gpx"),
-    ("output.channels", "flow"),
-];
+pub(super) const LATER_WORDS: &[(&str, &str)] =
+    &[("quality.solver", "oracle"), ("flight.format", "ulog"), ("flight.format", "gpx"), ("output.channels", "flow")];
 
 /// Keys without which there is nothing to run, under the table that makes them necessary.
 pub(super) const REQUIRED: &[(&str, &str)] = &[

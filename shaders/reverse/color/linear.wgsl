@@ -1,0 +1,8 @@
+// The ideal frame's values are linear light and have their fog.
+fn after_gather(ray: Ray, color: vec3<f32>) -> vec3<f32> {
+    return color;
+}
+
+fn output_color(value: vec3<f32>) -> vec3<f32> {
+    return value;
+}
