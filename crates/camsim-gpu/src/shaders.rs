@@ -168,6 +168,6 @@ mod tests {
     #[test]
     fn faults_are_named() {
         assert!(matches!(compose("no/such.wgsl", &[]), Err(ComposeError::Missing(_))));
-        assert!(matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "ray"));
+        assert!(matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "keys"));
     }
 }
