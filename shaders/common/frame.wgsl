@@ -44,7 +44,7 @@ struct Frame {
     rk2_step_rad: f32,
     // p1 p2 of the lens, for the lens inverse of the paper preset.
     lens_tangential: vec2<f32>,
-    // Key camera in the world, for coords: NED position and the columns of ned_from_key.
+    // Mid-window camera in the world, for coords: NED position and the columns of ned_from_key.
     key_position_ned_m: vec4<f32>,
     ned_from_key_x: vec4<f32>,
     ned_from_key_y: vec4<f32>,
@@ -57,6 +57,11 @@ struct Frame {
     lens_radial: vec4<f32>,
     // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0 = clear).
     linear_fog: vec4<f32>,
+    // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.
+    keys: u32,
+    key_rows: u32,
+    exposure_share: f32,
+    pad3: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -24,8 +24,9 @@ fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
     let at = clamp(at_px, vec2<f32>(0.0), last);
     let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
     let t = at - base;
-    let b = vec2<i32>(base);
-    let top = min(b + 1, vec2<i32>(last));
+    let first = vec2<i32>(0, key_row());
+    let b = first + vec2<i32>(base);
+    let top = min(b + 1, first + vec2<i32>(last));
     let d00 = textureLoad(ideal_depth, b, 0).x;
     let d10 = textureLoad(ideal_depth, vec2<i32>(top.x, b.y), 0).x;
     let d01 = textureLoad(ideal_depth, vec2<i32>(b.x, top.y), 0).x;
@@ -42,5 +43,6 @@ fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
 fn ideal_color_at(at_px: vec2<f32>) -> vec4<f32> {
     let size = vec2<f32>(textureDimensions(ideal_color));
     let last = vec2<f32>(frame.ideal_size_px) - 1.0;
-    return textureSampleLevel(ideal_color, ideal_sampler, (clamp(at_px, vec2<f32>(0.0), last) + 0.5) / size, 0.0);
+    let at = clamp(at_px, vec2<f32>(0.0), last) + vec2<f32>(0.5, 0.5 + f32(key_row()));
+    return textureSampleLevel(ideal_color, ideal_sampler, at / size, 0.0);
 }

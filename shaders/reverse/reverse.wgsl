@@ -4,6 +4,7 @@
 #import common/frame.wgsl
 #import common/noise.wgsl
 #import reverse/ideal_frame.wgsl
+#import <slot:keys>
 #import <slot:ray>
 #import <slot:depth>
 #import <slot:temporal_inverse>
@@ -26,6 +27,7 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let weight = vignette_weight(pixel);
     var gathered = Gathered(vec4<f32>(0.0), true);
+    use_key_of_line(pixel);
     if (weight > 0.0) {
         gathered = gather_edges(pixel, ray, gather(pixel, ray));
     }

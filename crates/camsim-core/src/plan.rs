@@ -27,6 +27,7 @@ mod edges;
 mod error;
 mod forced;
 mod grain;
+mod keys;
 mod levels;
 mod lines;
 mod motion;
@@ -38,6 +39,7 @@ pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub use error::Predicted;
+pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
 
@@ -165,13 +167,15 @@ pub struct FramePlan {
     pub camera: Arc<CameraModel>,
     /// Row timing.
     pub shutter: Shutter,
-    /// Instant of the ideal frame, path time, seconds.
+    /// Middle of the window, path time, seconds.
     pub key_s: f64,
-    /// Its pose.
+    /// The pose then: the camera that source coordinates are given in, and that of the ideal frame where there is only one.
     pub key_pose: CameraPose,
     /// The camera's motion then, in its own axes: all that the constant-twist solvers know of it.
     pub key_twist: Twist,
-    /// Its pixels.
+    /// Instants and poses of the ideal frames, in order of time.
+    pub keys: Vec<KeyFrame>,
+    /// Pixels of each ideal frame.
     pub ideal: IdealGeometry,
     /// Lens inverse.
     pub ray: RayStage,
@@ -203,6 +207,13 @@ impl FramePlan {
     #[must_use]
     pub fn tangents(&self) -> [f64; 4] {
         self.ideal.tangents()
+    }
+
+    /// How much of the frame's window has gone by at an instant, path time, seconds: 0 to 1 within it.
+    #[must_use]
+    pub fn window_share(&self, t_s: f64) -> f64 {
+        let [first_s, last_s] = self.window_s;
+        if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 }
     }
 }
 
@@ -287,11 +298,12 @@ impl Planner {
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
         let is_paper = quality.preset == Preset::Paper;
-        let ideal = if is_paper {
-            paper::ideal_geometry(&reach.camera)
-        } else {
-            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, scene, demanded.map(|stage| (stage, key_twist)))
+        let geometry = |keys: &[KeyFrame]| {
+            let displaced = demanded.map(|stage| (stage, key_twist));
+            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene, displaced)
         };
+        let one_key = keys::spread(path, window_s, 1);
+        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key) };
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
@@ -326,6 +338,16 @@ impl Planner {
         };
         let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         motion::note_skips(&motion, temporal, &mut skipped);
+        let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
+        let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
+            let keys = keys::spread(path, window_s, count);
+            let ideal = geometry(&keys);
+            (keys, ideal)
+        });
+        let keys = keys.map_or(one_key, |(keys, of_keys)| {
+            ideal = of_keys;
+            keys
+        });
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,
@@ -339,6 +361,7 @@ impl Planner {
             key_s,
             key_pose,
             key_twist,
+            keys,
             ideal,
             ray,
             temporal,

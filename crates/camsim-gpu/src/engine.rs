@@ -156,7 +156,7 @@ impl Engine {
 /// What was drawn last: the same again need not be drawn.
 #[derive(Debug, PartialEq)]
 struct Drawn {
-    pose: CameraPose,
+    poses: Vec<CameraPose>,
     ideal: IdealGeometry,
     edges: EdgeStage,
     terrain_error_px: f64,
@@ -188,7 +188,8 @@ pub struct Session<'a> {
 /// Buffers of one frame in flight.
 #[derive(Debug)]
 struct Slot {
-    ideal: IdealSlot,
+    /// One for each ideal frame, as many as any frame needed so far.
+    ideal: Vec<IdealSlot>,
     frame: wgpu::Buffer,
     poses: wgpu::Buffer,
     color: Output,
@@ -227,7 +228,7 @@ impl Slot {
             mapped_at_creation: false,
         });
         Self {
-            ideal: ideal_pass.slot(gpu, &sequence.scene, buffers),
+            ideal: vec![ideal_pass.slot(gpu, &sequence.scene, buffers)],
             frame,
             poses: pose_buffer(gpu, 48 * width.max(height)),
             color: Output::new(gpu, "camsim.color", 16 * width * height),
@@ -285,8 +286,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    /// The ideal frame that the last rendered frame was gathered from: linear R G B A (with the paper preset sRGB values as stored) and
-    /// inverse depth (1/m), row-major. For tests and for looking at stages one by one.
+    /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A (with the paper preset sRGB
+    /// values as stored) and inverse depth (1/m), row-major. For tests and for looking at stages one by one.
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.
@@ -358,10 +359,11 @@ impl Session<'_> {
         self.lens_map = Some((bits, map));
     }
 
-    /// Pass 2, only when the key pose or the ideal frame's geometry has changed: the ideal frame.
+    /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
     fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
+        let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
-            drawn.pose == plan.key_pose
+            drawn.poses == poses
                 && drawn.ideal == plan.ideal
                 && drawn.edges == plan.edges
                 && drawn.terrain_error_px == plan.terrain_error_px
@@ -369,7 +371,7 @@ impl Session<'_> {
             return;
         }
         let gpu = &self.engine.gpu;
-        let size_px = IdealTarget::size_for(&plan.ideal, gpu.max_side_px());
+        let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
         let target = self.targets.iter().position(|target| target.serves(size_px, plan.edges)).unwrap_or_else(|| {
             let fine = plan.edges != EdgeStage::None;
             let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
@@ -383,18 +385,21 @@ impl Session<'_> {
             self.targets.len() - 1
         });
         let sequence = self.planner.sequence();
+        let ideal_slots = &mut self.slots[slot].ideal;
+        while ideal_slots.len() < poses.len() {
+            ideal_slots.push(self.ideal_pass.slot(gpu, &sequence.scene, &self.buffers));
+        }
         let lod = self.ideal_pass.encode(
             gpu,
             encoder,
-            &self.slots[slot].ideal,
+            ideal_slots,
             &sequence.scene,
             &self.buffers,
             plan,
             plan.terrain_error_px,
             &self.targets[target],
         );
-        self.drawn =
-            Some(Drawn { pose: plan.key_pose, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
+        self.drawn = Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
     }
 
     /// Pass 3: the output frame.

@@ -1,7 +1,8 @@
 //! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NEAR_M},
+    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
+    pose::CameraPose,
     scenario::Preset,
     scene::{LodSelection, Scene, select_lod},
     temporal::IdealGeometry,
@@ -28,8 +29,6 @@ pub const STORED_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSr
 pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth format of the ideal frame: near / z.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Sizes are rounded up to this, so that a few allocations serve all frames. Depends on the frame alone.
-const SIZE_QUANTUM_PX: u32 = 64;
 /// Distance between the placements of two meshes in their buffer.
 const PLACEMENT_STRIDE: u64 = 256;
 
@@ -47,10 +46,12 @@ pub struct IdealTarget {
 }
 
 impl IdealTarget {
-    /// Allocated size for an ideal frame.
+    /// Allocated size for the ideal frames of a plan: one below the other. Rounded up, so that a few allocations serve all frames;
+    /// depends on the frame alone.
     #[must_use]
-    pub fn size_for(ideal: &IdealGeometry, max_side_px: u32) -> [u32; 2] {
-        ideal.size_px.map(|side| side.next_multiple_of(SIZE_QUANTUM_PX).min(max_side_px))
+    pub fn size_for(plan: &FramePlan, max_side_px: u32) -> [u32; 2] {
+        let width = plan.ideal.size_px[0].next_multiple_of(SIZE_QUANTUM_PX);
+        [width, key_rows(&plan.ideal) * plan.keys.len() as u32].map(|side| side.min(max_side_px))
     }
 
     /// Whether a frame of this size and edge stage is drawn to it.
@@ -92,6 +93,12 @@ fn color_format(preset: Preset) -> wgpu::TextureFormat {
     }
 }
 
+/// Rows from one ideal frame to the next in a target.
+#[must_use]
+pub fn key_rows(ideal: &IdealGeometry) -> u32 {
+    ideal.size_px[1].next_multiple_of(SIZE_QUANTUM_PX)
+}
+
 /// Pipelines of the ideal render.
 #[derive(Debug)]
 pub struct IdealPass {
@@ -110,7 +117,7 @@ struct SurfacePipelines {
     mesh: wgpu::RenderPipeline,
 }
 
-/// Buffers of one frame in flight, and their bind groups.
+/// Buffers of one ideal frame of a frame in flight, and their bind groups.
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
@@ -156,7 +163,7 @@ impl IdealPass {
         Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
     }
 
-    /// Buffers for one frame in flight of this scene.
+    /// Buffers for one ideal frame of this scene.
     #[must_use]
     pub fn slot(&self, gpu: &GpuContext, scene: &Scene, buffers: &SceneBuffers) -> IdealSlot {
         let create = |label, size: u64, usage| {
@@ -203,24 +210,18 @@ impl IdealPass {
         IdealSlot { camera, draws, placements, camera_group, terrain_group, mesh_groups }
     }
 
-    /// Records the ideal frame of a plan; returns the level of detail that the terrain got.
+    /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
     pub fn encode(
         &self,
         gpu: &GpuContext,
         encoder: &mut wgpu::CommandEncoder,
-        slot: &IdealSlot,
+        slots: &[IdealSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
         max_terrain_error_px: f64,
         target: &IdealTarget,
     ) -> LodSelection {
-        let base_ned_m = plan.key_pose.position_ned_m.round();
-        gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, base_ned_m, scene)));
-        let focal_px = plan.ideal.focal_px.max_element();
-        let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
-            select_lod(terrain, &plan.key_pose, plan.tangents(), focal_px, max_terrain_error_px)
-        });
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (color_view, depth_view, resolved_view, scale, pipelines) = match &target.fine {
             None => (view(&target.color), view(&target.depth), None, 1, &self.plain),
@@ -246,16 +247,30 @@ impl IdealPass {
             multiview_mask: None,
         });
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
-        pass.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
-        pass.set_scissor_rect(0, 0, width, height);
-        pass.set_bind_group(0, &slot.camera_group, &[]);
-        self.draw_terrain(gpu, &mut pass, pipelines, slot, scene, buffers, &lod, base_ned_m);
-        self.draw_meshes(gpu, &mut pass, pipelines, slot, buffers, base_ned_m);
+        let focal_px = plan.ideal.focal_px.max_element();
+        let mut middle_lod = LodSelection::default();
+        for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
+            let base_ned_m = key.pose.position_ned_m.round();
+            gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
+            let first_row = key_rows(&plan.ideal) * k as u32 * scale;
+            pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(0, first_row, width, height);
+            pass.set_bind_group(0, &slot.camera_group, &[]);
+            let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
+                select_lod(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px)
+            });
+            self.draw_terrain(gpu, &mut pass, pipelines, slot, scene, buffers, &lod, base_ned_m);
+            self.draw_meshes(gpu, &mut pass, pipelines, slot, buffers, base_ned_m);
+            if k == plan.keys.len() / 2 {
+                middle_lod = lod;
+            }
+        }
         drop(pass);
         if let Some(fine) = &target.fine {
-            self.resolve.encode(gpu, encoder, plan.ideal.size_px, target, fine);
+            let used_rows = key_rows(&plan.ideal) * (plan.keys.len() as u32 - 1) + plan.ideal.size_px[1];
+            self.resolve.encode(gpu, encoder, [plan.ideal.size_px[0], used_rows], target, fine);
         }
-        lod
+        middle_lod
     }
 
     fn draw_terrain(
@@ -334,8 +349,8 @@ impl IdealPass {
 }
 
 /// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.
-fn ideal_camera(plan: &FramePlan, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
-    let (pose, ideal) = (&plan.key_pose, &plan.ideal);
+fn ideal_camera(plan: &FramePlan, pose: &CameraPose, base_ned_m: DVec3, scene: &Scene) -> IdealCamera {
+    let ideal = &plan.ideal;
     let camera_from_ned = DMat3::from_quat(pose.ned_from_camera.inverse());
     let row = |i: usize| camera_from_ned.row(i).as_vec3().extend(0.0).to_array();
     let [width, height] = ideal.size_px.map(f64::from);

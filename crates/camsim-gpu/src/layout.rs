@@ -42,6 +42,10 @@ pub struct FrameUniforms {
     pub key_rate_rad_s: [f32; 4],
     pub lens_radial: [f32; 4],
     pub linear_fog: [f32; 4],
+    pub keys: u32,
+    pub key_rows: u32,
+    pub exposure_share: f32,
+    pub pad3: u32,
 }
 
 /// Mirror of `IdealCamera` in shaders/ideal/surface.wgsl.
@@ -154,6 +158,10 @@ mod tests {
                 key_rate_rad_s,
                 lens_radial,
                 linear_fog,
+                keys,
+                key_rows,
+                exposure_share,
+                pad3,
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);

@@ -16,7 +16,7 @@ use glam::DMat3;
 
 use crate::{
     context::GpuContext,
-    ideal::FineTarget,
+    ideal::{FineTarget, key_rows},
     layout::FrameUniforms,
     shaders::{self, ComposeError, Slot},
 };
@@ -48,6 +48,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
+    /// More than one ideal frame.
+    pub keys: bool,
     /// Rays of their own at silhouettes.
     pub edges: bool,
     /// Depth and coordinates beside the picture.
@@ -71,6 +73,7 @@ impl PipelineKey {
             ray: plan.ray,
             temporal,
             blur: plan.blur.is_some(),
+            keys: plan.keys.len() > 1,
             edges: plan.edges != EdgeStage::None,
             truth: plan.truth,
             paper: plan.preset == Preset::Paper,
@@ -89,15 +92,20 @@ impl PipelineKey {
                     if blur && temporal == Identity {
                         continue;
                     }
-                    for edges in [false, true] {
-                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, edges, truth, paper: false }));
+                    // Without parallax all key cameras see the same.
+                    let parallax = temporal == TemporalKind::Reproject;
+                    for (several, edges) in [(false, false), (false, true), (true, false), (true, true)] {
+                        if several && !parallax {
+                            continue;
+                        }
+                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, keys: several, edges, truth, paper: false }));
                     }
                 }
             }
         }
         for ray in [RayStage::Pinhole, RayStage::GaussNewton] {
             for blur in [false, true] {
-                keys.extend([false, true].map(|truth| Self { ray, temporal: Rk2, blur, edges: false, truth, paper: true }));
+                keys.extend([false, true].map(|truth| Self { ray, temporal: Rk2, blur, keys: false, edges: false, truth, paper: true }));
             }
         }
         keys
@@ -105,7 +113,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 7] {
+    pub fn slots(&self) -> [Slot; 8] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -118,6 +126,7 @@ impl PipelineKey {
             TemporalKind::Linear => "reverse/temporal_inverse/linear.wgsl",
             TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
         };
+        let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
         let gather = match (self.blur, self.paper) {
             (false, _) => "reverse/gather/sharp.wgsl",
             (true, false) => "reverse/gather/blur.wgsl",
@@ -130,6 +139,7 @@ impl PipelineKey {
         let edges = if self.edges { "reverse/edges/supersampled.wgsl" } else { "reverse/edges/none.wgsl" };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
+            ("keys", keys),
             ("ray", ray),
             ("depth", depth),
             ("temporal_inverse", temporal),
@@ -355,6 +365,9 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         ned_from_key_z: column(2),
         edge_scale,
         edge_samples,
+        keys: plan.keys.len() as u32,
+        key_rows: key_rows(&plan.ideal),
+        exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
         lens_radial: [lens(0), lens(1), lens(4), 0.0],
@@ -382,6 +395,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 80);
+        assert_eq!(PipelineKey::all().len(), 96);
     }
 }

@@ -26,6 +26,7 @@ embedded![
     "reverse/depth/bilinear.wgsl",
     "reverse/depth/nearest.wgsl",
     "reverse/edges/none.wgsl",
+    "reverse/edges/seen.wgsl",
     "reverse/edges/supersampled.wgsl",
     "reverse/emit/color.wgsl",
     "reverse/emit/truth.wgsl",
@@ -35,6 +36,8 @@ embedded![
     "reverse/gather/sharp.wgsl",
     "reverse/gather/straight.wgsl",
     "reverse/ideal_frame.wgsl",
+    "reverse/keys/several.wgsl",
+    "reverse/keys/single.wgsl",
     "reverse/lens_inverse/brown_conrady.wgsl",
     "reverse/lens_inverse/kannala_brandt.wgsl",
     "reverse/lens_inverse/lens.wgsl",
@@ -165,6 +168,6 @@ mod tests {
     #[test]
     fn faults_are_named() {
         assert!(matches!(compose("no/such.wgsl", &[]), Err(ComposeError::Missing(_))));
-        assert!(matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "ray"));
+        assert!(matches!(compose("reverse/reverse.wgsl", &[]), Err(ComposeError::Unfilled { slot, .. }) if slot == "keys"));
     }
 }

@@ -1,4 +1,14 @@
 // No silhouette can be in view: the plain gather stands.
+#import reverse/edges/seen.wgsl
+
 fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     return plain;
+}
+
+fn seen_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
+    return smooth_px_at_phase(pixel, ray, phase);
+}
+
+fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
+    return smooth_mid(pixel, ray);
 }

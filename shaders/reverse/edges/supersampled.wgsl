@@ -2,6 +2,7 @@
 // the colour of the one sample of the ideal frame that it meets, so that surfaces never mix but by area and time.
 // Twin: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
+#import reverse/edges/seen.wgsl
 
 @group(1) @binding(5) var fine_color: texture_multisampled_2d<f32>;
 @group(1) @binding(6) var fine_depth: texture_depth_multisampled_2d;
@@ -28,7 +29,8 @@ fn fine_sample(at_px: vec2<f32>) -> FineSample {
     let at = clamp(at_px + 0.5, vec2<f32>(0.0), last) * f32(frame.edge_scale);
     let texel = floor(at);
     let half = vec2<i32>(2.0 * (at - texel));
-    return FineSample(vec2<i32>(texel), half.x + 2 * half.y);
+    let first_row = key_row() * i32(frame.edge_scale);
+    return FineSample(vec2<i32>(texel) + vec2<i32>(0, first_row), half.x + 2 * half.y);
 }
 
 fn fine_inverse_depth(at_px: vec2<f32>) -> f32 {
@@ -41,8 +43,11 @@ fn fine_color_at(at_px: vec2<f32>) -> vec3<f32> {
     return textureLoad(fine_color, s.texel, s.index).rgb;
 }
 
-fn nearest_inverse_depth() -> f32 {
-    return 1.02 * bitcast<f32>(nearest) / frame.near_m;
+// Of the nearest surface, as a line's own camera sees it.
+fn nearest_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
+    let in_key = 1.02 * bitcast<f32>(nearest) / frame.near_m;
+    // A camera that all but reaches the surface would stretch the search without end.
+    return min(line_inverse_depth(uv, pose, in_key), 4.0 * in_key);
 }
 
 // Whether a stretch of the ideal frame passes a silhouette.
@@ -64,70 +69,129 @@ fn ray_place(i: u32) -> vec3<f32> {
     return vec3<f32>(x - 0.5, y - 0.5, fract(GOLDEN * (f32(i) + 0.5)));
 }
 
+// Whether the pixel's rays of one pose may meet several surfaces: their parallax passes a silhouette.
+fn near_edge(uv: vec2<f32>, pose: Pose) -> bool {
+    let near = point_at(uv, pose, nearest_inverse_depth(uv, pose));
+    let far = point_at(uv, pose, 0.0);
+    return near.z > 0.0 && far.z > 0.0 && passes_edge(ideal_px_from_point(near), ideal_px_from_point(far));
+}
+
+// Pose in the chosen key at a share of the exposure; nodes are equally far apart in time.
+fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
+    if (share == 0.5) {
+        return pose_mid(pixel);
+    }
+    let along = share * f32(frame.nodes - 1u);
+    let node = min(u32(along), max(frame.nodes, 2u) - 2u);
+    let pose = pose_at_node(pixel, node);
+    if (frame.nodes > 1u) {
+        return mix_pose(pose, pose_at_node(pixel, node + 1u), along - f32(node));
+    }
+    return pose;
+}
+
 fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     var edge = plain.color.a < 0.9999;
     for (var node = 0u; HAS_PARALLAX && !edge && node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
-        let pose = pose_at_node(pixel, node);
-        let near = point_at(ray.uv, pose, nearest_inverse_depth());
-        let far = point_at(ray.uv, pose, 0.0);
-        edge = near.z > 0.0 && far.z > 0.0 && passes_edge(ideal_px_from_point(near), ideal_px_from_point(far));
+        edge = near_edge(ray.uv, pose_at_node(pixel, node));
     }
     if (!edge) {
         return plain;
     }
     var sum = vec3<f32>(0.0);
     for (var i = 0u; i < frame.edge_samples; i++) {
-        let f = ray_place(i).xy;
-        let uv = ray.uv + f.x * ray.d_dx + f.y * ray.d_dy;
-        // Nodes are equally far apart in time.
-        let along = ray_place(i).z * f32(frame.nodes - 1u);
-        let node = min(u32(along), max(frame.nodes, 2u) - 2u);
-        var pose = pose_at_node(pixel, node);
-        if (frame.nodes > 1u) {
-            pose = mix_pose(pose, pose_at_node(pixel, node + 1u), along - f32(node));
-        }
-        sum += fine_color_at(first_surface_px(uv, pose));
+        let place = ray_place(i);
+        let found = first_surface_of_keys(pixel, ray.uv + place.x * ray.d_dx + place.y * ray.d_dy, place.z);
+        sum += fine_color_at(found.at_px);
     }
+    use_key_of_line(pixel);
     return Gathered(vec4<f32>(sum / f32(frame.edge_samples), 1.0), plain.inside);
 }
 
-// Where a ray first meets a surface of the ideal frame, in ideal pixels. The ray's points, from the nearest surface of all to infinity,
-// lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several the nearest
-// counts. If there is none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
-fn first_surface_px(uv: vec2<f32>, pose: Pose) -> vec2<f32> {
-    let w_near = nearest_inverse_depth();
+fn seen_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
+    use_key_of_line(pixel);
+    if (!near_edge(ray.uv, pose_along(pixel, phase + 0.5))) {
+        return smooth_px_at_phase(pixel, ray, phase);
+    }
+    let found = first_surface_of_keys(pixel, ray.uv, phase + 0.5);
+    return reference_px(found.at_px, found.in_key);
+}
+
+fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
+    use_key_of_line(pixel);
+    if (!near_edge(ray.uv, pose_mid(pixel))) {
+        return smooth_mid(pixel, ray);
+    }
+    let found = first_surface_of_keys(pixel, ray.uv, 0.5);
+    return seen_from(found.at_px, found.in_line, found.in_key);
+}
+
+struct Met {
+    // Ideal pixels of the chosen key.
+    at_px: vec2<f32>,
+    // Inverse planar depth there in the line's and in the key's camera, 1/m.
+    in_line: f32,
+    in_key: f32,
+    // False: the key did not see what the ray meets, and what it saw beside it stands in.
+    seen: bool,
+}
+
+// In the key that is nearest in time, or in the next that sees what the ray meets: that key is chosen afterwards.
+fn first_surface_of_keys(pixel: vec2<u32>, uv: vec2<f32>, share: f32) -> Met {
+    use_key_of_rank(pixel, share, 0u);
+    let first = first_surface(uv, pose_along(pixel, share));
+    if (first.seen) {
+        return first;
+    }
+    for (var rank = 1u; rank < key_count(); rank++) {
+        use_key_of_rank(pixel, share, rank);
+        let found = first_surface(uv, pose_along(pixel, share));
+        if (found.seen) {
+            return found;
+        }
+    }
+    use_key_of_rank(pixel, share, 0u);
+    return first;
+}
+
+// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all to infinity, lie on a line of
+// the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several the nearest counts. If there is
+// none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
+fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
+    let w_near = nearest_inverse_depth(uv, pose);
     let near_px = ideal_px_from_point(point_at(uv, pose, w_near));
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
     let px_per_w = distance(near_px, far_px) / max(w_near, 1e-12);
     if (px_per_w * w_near < 0.1 * MEETS_PX) {
-        return far_px;
+        let in_key = fine_inverse_depth(far_px);
+        return Met(far_px, line_inverse_depth(uv, pose, in_key), in_key, true);
     }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);
-    var met = -1.0;
-    var met_px = far_px;
-    var farthest = 1e30;
-    var farthest_px = far_px;
+    var met = Met(far_px, -1.0, 0.0, false);
+    var farthest = Met(far_px, 1e30, 0.0, false);
     for (var i = 0u; i <= looks; i++) {
         var w = w_near * (1.0 - f32(i) / f32(looks));
-        if (w <= met) {
+        if (w <= met.in_line) {
             break;
         }
         for (var k = 0u; k < LOOK_STEPS; k++) {
             let at_px = ideal_px_from_point(point_at(uv, pose, w));
-            let found = line_inverse_depth(uv, pose, fine_inverse_depth(at_px));
-            if (found < farthest) {
-                farthest = found;
-                farthest_px = at_px;
+            let in_key = fine_inverse_depth(at_px);
+            let found = line_inverse_depth(uv, pose, in_key);
+            if (found < farthest.in_line) {
+                farthest = Met(at_px, found, in_key, false);
             }
             if (abs(found - w) * px_per_w < MEETS_PX) {
-                if (found > met) {
-                    met = found;
-                    met_px = at_px;
+                if (found > met.in_line && inside_ideal(at_px)) {
+                    met = Met(at_px, found, in_key, true);
                 }
                 break;
             }
             w = found;
         }
     }
-    return select(farthest_px, met_px, met >= 0.0);
+    if (met.seen) {
+        return met;
+    }
+    return farthest;
 }

@@ -6,7 +6,7 @@ const EMITS_RAYS: bool = true;
 struct Truth {
     // Ideal ray.
     uv: vec2<f32>,
-    // Source in the ideal frame, pixels, at `frame.coords_phase`.
+    // Source in the mid-window ideal frame, pixels, at `frame.coords_phase`.
     source_px: vec2<f32>,
     // The ray's point in NED at mid-exposure, metres; NaN-free: 0 where nothing is.
     point_ned_m: vec3<f32>,
@@ -20,13 +20,12 @@ fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {
     let i = pixel.y * frame.size_px.x + pixel.x;
     out_color[i] = vec4<f32>(color, 1.0);
     var truth = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
-    truth.source_px = source_at_phase(pixel, ray, frame.coords_phase).at_px;
-    let mid = temporal_inverse_with_depth(ray.uv, pose_mid(pixel));
-    if (mid.inverse_depth > 0.0) {
+    truth.source_px = seen_px_at_phase(pixel, ray, frame.coords_phase);
+    let mid = seen_mid(pixel, ray);
+    if (mid.inverse_depth > 0.0 && mid.point.w > 0.0) {
         truth.depth_m = 1.0 / mid.inverse_depth;
         // On the key ray of the source, at the depth found there: no absolute pose is differenced in f32.
-        let in_key = vec3<f32>((mid.at_px - frame.ideal_principal_px) / frame.ideal_focal_px, 1.0);
-        let p = in_key / max(inverse_depth(mid.at_px).value, 1e-12);
+        let p = mid.point.xyz / mid.point.w;
         truth.point_ned_m = frame.key_position_ned_m.xyz
             + p.x * frame.ned_from_key_x.xyz + p.y * frame.ned_from_key_y.xyz + p.z * frame.ned_from_key_z.xyz;
     }

@@ -1,4 +1,4 @@
-// Relative poses: x_key = R x_line + t, one entry a line and exposure node, made in f64 on the CPU.
+// Relative poses: x_key = R x_line + t, one entry a key, line and exposure node, made in f64 on the CPU.
 #import reverse/temporal_inverse/line_entry.wgsl
 
 struct Pose {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec2;
 
 use super::{
-    TemporalStage,
+    KeyFrame, TemporalStage,
     probes::{Probe, probes},
 };
 use crate::{
@@ -110,14 +110,15 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
 }
 
 /// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
-/// exposure), at infinity and at the nearest depth in view. A `demanded` constant-twist solver also looks where the point is not: there
-/// too, and at the ray's own place, where it reads the depth.
+/// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time. A `demanded` constant-twist solver
+/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth.
 pub(super) fn ideal_geometry(
     reach: &LensReach,
     path: &CameraPath,
     shutter: &Shutter,
     stamp_s: f64,
     key_s: f64,
+    keys: &[KeyFrame],
     scene: &Scene,
     demanded: Option<(TemporalStage, Twist)>,
 ) -> IdealGeometry {
@@ -138,15 +139,17 @@ pub(super) fn ideal_geometry(
             high = high.max(at);
         };
         for phase in [-0.5, 0.0, 0.5] {
-            let (rotation, shift) = path.pose(mid_s + phase * shutter.exposure_s()).relative_to(&key);
-            let direction = rotation * uv.extend(1.0);
+            let t_s = mid_s + phase * shutter.exposure_s();
+            let pose = path.pose(t_s);
             for w in [0.0, inverse_near] {
-                let in_key = direction + w * shift;
-                if in_key.z > 0.02 {
-                    include(in_key.truncate() / in_key.z);
+                for key in super::keys::nearest_two(keys, mid_s) {
+                    let (rotation, shift) = pose.relative_to(&key.pose);
+                    let in_key = rotation * uv.extend(1.0) + w * shift;
+                    if in_key.z > 0.02 {
+                        include(in_key.truncate() / in_key.z);
+                    }
                 }
-                let dt_s = mid_s + phase * shutter.exposure_s() - key_s;
-                if let Some(at) = demanded.and_then(|(stage, twist)| stage.displaced(uv, w, &twist, dt_s)) {
+                if let Some(at) = demanded.and_then(|(stage, twist)| stage.displaced(uv, w, &twist, t_s - key_s)) {
                     include(at);
                     include(uv);
                 }

@@ -28,8 +28,10 @@ pub struct PlanSummary<'a> {
     pub ideal_focal_px: [f64; 2],
     /// Ideal principal point.
     pub ideal_principal_px: [f64; 2],
-    /// Instant of the ideal frame, path time, seconds.
+    /// Middle of the window: source coordinates are those of the camera then, path time, seconds.
     pub key_s: f64,
+    /// Instants of the ideal frames, path time, seconds.
+    pub key_times_s: Vec<f64>,
     /// Passes in order.
     pub passes: Vec<String>,
     /// Lens inverse.
@@ -57,6 +59,13 @@ impl FramePlan {
     #[must_use]
     pub fn passes(&self) -> Vec<String> {
         let [width, height] = self.ideal.size_px;
+        let frames = match self.keys.len() {
+            1 => String::new(),
+            count => {
+                let spacing_ms = 1e3 * (self.window_s[1] - self.window_s[0]) / count as f64;
+                format!("{count} frames, {spacing_ms:.1} ms apart, of ")
+            }
+        };
         let mut passes = Vec::new();
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
@@ -64,12 +73,12 @@ impl FramePlan {
         let rays = match self.edges {
             EdgeStage::None => {
                 let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-                passes.push(format!("ideal: {width}x{height} px {color} + depth32float (reversed)"));
+                passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed)"));
                 String::new()
             }
             EdgeStage::Supersampled { scale, samples } => {
                 passes.push(format!(
-                    "ideal: {}x{} px rgba16float + depth32float (reversed), 4 samples each",
+                    "ideal: {frames}{}x{} px rgba16float + depth32float (reversed), 4 samples each",
                     width * scale,
                     height * scale
                 ));
@@ -114,6 +123,7 @@ impl FramePlan {
             ideal_focal_px: self.ideal.focal_px.to_array(),
             ideal_principal_px: self.ideal.principal_px.to_array(),
             key_s: self.key_s,
+            key_times_s: self.keys.iter().map(|key| key.t_s).collect(),
             passes: self.passes(),
             ray: self.ray,
             temporal: self.temporal,

@@ -41,6 +41,14 @@ pub enum EdgeStage {
     },
 }
 
+/// Fine pixels along a side of an ideal pixel.
+pub(super) fn scale_of(edges: EdgeStage) -> u32 {
+    match edges {
+        EdgeStage::None => 1,
+        EdgeStage::Supersampled { scale, .. } => scale,
+    }
+}
+
 /// Slopes and borders of a scene, found once.
 #[derive(Debug, Default)]
 pub(super) struct SceneOutline {
@@ -75,6 +83,15 @@ impl SceneOutline {
         let chunks = blocks.iter().map(|blocks| blocks.iter().copied().fold(Patch::EMPTY, Patch::join)).collect();
         let meshes = scene.meshes.iter().map(|mesh| MeshOutline { bounds: mesh_bounds(mesh), flat_convex: is_flat_convex(mesh) }).collect();
         Self { chunks, blocks, meshes }
+    }
+
+    /// Bound on the distance of any surface in view, metres; `None` without one.
+    pub(super) fn farthest_m(&self, pose: &CameraPose, tangents: [f64; 4]) -> Option<f64> {
+        let frustum = Frustum::new(pose, tangents);
+        let boxes = self.chunks.iter().map(|patch| &patch.bounds).chain(self.meshes.iter().map(|mesh| &mesh.bounds));
+        let camera = pose.position_ned_m;
+        let corner_m = |bounds: &Aabb| (bounds.max - camera).abs().max((bounds.min - camera).abs()).length();
+        boxes.filter(|bounds| frustum.may_see(bounds)).map(corner_m).reduce(f64::max)
     }
 
     /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents` (u_min, u_max, v_min, v_max).

@@ -3,10 +3,12 @@
 use glam::{DMat3, DVec3};
 
 use super::{FramePlan, table_shape};
-use crate::{frame::RowRecord, mount::CameraPath, shutter::LinesAxis};
+use crate::{frame::RowRecord, mount::CameraPath, pose::CameraPose, shutter::LinesAxis};
 
-/// Relative poses `x_key = R x_line + t` of a frame: `[field][line][node]`, each three rows of `(R, t)`; with more than one node the
-/// mid-exposure pose follows the nodes.
+/// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`; with more than one node
+/// the mid-exposure pose follows the nodes. Of frames with several keys two more parts follow: the poses `x_mid = R x_key + t` of the
+/// keys in the mid-window camera, then an entry for each field and line with the line's mid-exposure as a share of the window in its
+/// first number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePoses {
     /// Rows of `(R | t)`.
@@ -27,10 +29,24 @@ pub struct LineTimes {
 /// The pose table of a frame.
 #[must_use]
 pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
-    let (entries, stride) = of_instants(plan, |t_s| {
-        let (rotation, shift) = path.pose(t_s).relative_to(&plan.key_pose);
+    let relative = |pose: &CameraPose, to: &CameraPose| {
+        let (rotation, shift) = pose.relative_to(to);
         rows_of(rotation, shift)
-    });
+    };
+    let mut entries = Vec::new();
+    let mut stride = 1;
+    for key in &plan.keys {
+        let (of_key, stride_of_key) = of_instants(plan, |t_s| relative(&path.pose(t_s), &key.pose));
+        entries.extend(of_key);
+        stride = stride_of_key;
+    }
+    if plan.keys.len() > 1 {
+        entries.extend(plan.keys.iter().map(|key| relative(&key.pose, &plan.key_pose)));
+        entries.extend(lines_of(plan).map(|(field, line)| {
+            let share = plan.window_share(plan.stamp_s + line_dt_s(plan, field, line));
+            [[share as f32, 0.0, 0.0, 0.0], [0.0; 4], [0.0; 4]]
+        }));
+    }
     LinePoses { entries, stride }
 }
 
@@ -41,23 +57,27 @@ pub fn line_times(plan: &FramePlan) -> LineTimes {
     LineTimes { dt_s, stride }
 }
 
+/// Fields and their lines, in the order of the tables.
+fn lines_of(plan: &FramePlan) -> impl Iterator<Item = (u32, u32)> {
+    let (_, lines, fields) = table_shape(&plan.shutter);
+    (0..fields).flat_map(move |field| (0..lines).map(move |line| (field, line)))
+}
+
 /// An entry for every `[field][line][node]` and the entries a line.
 fn of_instants<T>(plan: &FramePlan, entry: impl Fn(f64) -> T) -> (Vec<T>, u32) {
     let (_, lines, fields) = table_shape(&plan.shutter);
     let nodes = plan.blur.map_or(1, |blur| blur.nodes);
     let stride = if nodes == 1 { 1 } else { nodes + 1 };
     let mut entries = Vec::with_capacity((fields * lines * stride) as usize);
-    for field in 0..fields {
-        for line in 0..lines {
-            let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
-            if nodes > 1 {
-                entries.extend((0..nodes).map(|node| {
-                    let along = f64::from(node) / f64::from(nodes - 1) - 0.5;
-                    entry(mid_s + plan.shutter.exposure_s() * along)
-                }));
-            }
-            entries.push(entry(mid_s));
+    for (field, line) in lines_of(plan) {
+        let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
+        if nodes > 1 {
+            entries.extend((0..nodes).map(|node| {
+                let along = f64::from(node) / f64::from(nodes - 1) - 0.5;
+                entry(mid_s + plan.shutter.exposure_s() * along)
+            }));
         }
+        entries.push(entry(mid_s));
     }
     (entries, stride)
 }

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Solver, TrackerSpec};
+use crate::plan::MAX_KEYS;
 
 /// One value that no run can use.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -214,8 +215,8 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     );
     check.at_least_one("quality.blur_samples", quality.blur_samples);
     check.at_least_one("quality.footprint_taps", quality.footprint_taps);
-    check.require(quality.key_frames.value().is_none_or(|frames| frames == 1), "quality.key_frames", || {
-        "only 1 ideal frame for each output frame is supported by this version; write 1 or \"auto\"".into()
+    check.require(quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)), "quality.key_frames", || {
+        format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\"")
     });
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()

@@ -72,71 +72,129 @@ pub fn ray_place(i: u32, count: u32) -> (DVec2, f64) {
     (DVec2::new(x, y) - 0.5, (GOLDEN * (f64::from(i) + 0.5)).fract())
 }
 
-/// Where a ray first meets a surface of the ideal frame, ideal pixels. The ray's points, from the nearest surface of all (`w_near`, 1/m)
-/// to infinity, lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several
-/// the nearest counts. If there is none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
+/// An ideal frame, and the poses over a line's exposure relative to it, equally far apart in time.
+#[derive(Clone, Copy, Debug)]
+pub struct KeyView<'a> {
+    /// `x_key = R x_line + t` at the nodes.
+    pub nodes: &'a [(DMat3, DVec3)],
+    /// What the key camera sees.
+    pub image: FineImage<'a>,
+}
+
+/// The frame's keys, at the middles of equal parts of its window, as one line sees them.
+#[derive(Clone, Copy, Debug)]
+pub struct Keys<'a> {
+    /// In order of time.
+    pub views: &'a [KeyView<'a>],
+    /// Mid-exposure of the line, share of the window.
+    pub line_share: f64,
+    /// Exposure, share of the window.
+    pub exposure_share: f64,
+    /// Largest inverse depth of all keys, 1/m.
+    pub nearest_w: f64,
+}
+
+/// Where a ray meets a surface of an ideal frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Ideal pixels.
+    pub at_px: DVec2,
+    /// Inverse planar depth there in the line's camera, 1/m.
+    pub in_line: f64,
+    /// False: the key camera did not see what the ray meets, and what it saw beside it stands in.
+    pub seen: bool,
+}
+
+/// The key of a rank (0 = nearest in time) of `count` keys at the middles of equal parts of the window.
 #[must_use]
-pub fn first_surface_px(uv: DVec2, key_from_line: (DMat3, DVec3), w_near: f64, image: &FineImage<'_>, ideal: &IdealGeometry) -> DVec2 {
+pub fn key_of_rank(share: f64, count: usize, rank: usize) -> usize {
+    let away = |key: usize| (share * count as f64 - key as f64 - 0.5).abs();
+    let mut keys: Vec<usize> = (0..count).collect();
+    // Stable: of two that are equally far the earlier comes first.
+    keys.sort_by(|&a, &b| away(a).total_cmp(&away(b)));
+    keys.get(rank).copied().unwrap_or_default()
+}
+
+/// Pose at a share of the exposure, linear between nodes.
+fn pose_along(nodes: &[(DMat3, DVec3)], share: f64) -> Option<(DMat3, DVec3)> {
+    let along = share * nodes.len().saturating_sub(1) as f64;
+    let node = (along as usize).min(nodes.len().saturating_sub(2));
+    let a = *nodes.get(node)?;
+    Some(nodes.get(node + 1).map_or(a, |b| {
+        let t = along - node as f64;
+        (a.0 * (1.0 - t) + b.0 * t, a.1.lerp(b.1, t))
+    }))
+}
+
+/// Where a ray first meets a surface, and the key that shows it: the nearest in time, or the next that sees what the ray meets.
+#[must_use]
+pub fn first_surface_of_keys(uv: DVec2, share: f64, keys: &Keys<'_>, ideal: &IdealGeometry) -> Option<(usize, Met)> {
+    let window_share = keys.line_share + (share - 0.5) * keys.exposure_share;
+    let mut first = None;
+    for rank in 0..keys.views.len() {
+        let key = key_of_rank(window_share, keys.views.len(), rank);
+        let view = keys.views.get(key)?;
+        let met = first_surface(uv, pose_along(view.nodes, share)?, keys.nearest_w, &view.image, ideal);
+        if met.seen {
+            return Some((key, met));
+        }
+        first = first.or(Some((key, met)));
+    }
+    first
+}
+
+/// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all (`nearest_w` in the key
+/// camera, 1/m) to infinity, lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth.
+/// Of several the nearest counts. If there is none, the farthest surface seen on the way stands in.
+#[must_use]
+pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, image: &FineImage<'_>, ideal: &IdealGeometry) -> Met {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
     let place = |w: f64| ideal.px_from_point(direction + w * shift);
+    let in_line = |in_key: f64| in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
+    let w_near = in_line(1.02 * nearest_w).min(4.0 * 1.02 * nearest_w);
     let far_px = place(0.0);
     let length_px = place(w_near).distance(far_px);
     let px_per_w = length_px / w_near.max(1e-12);
     if length_px < 0.1 * MEETS_PX {
-        return far_px;
+        return Met { at_px: far_px, in_line: in_line(image.at(far_px).inverse_depth), seen: true };
     }
     let looks = (length_px / LOOK_PX).ceil().clamp(1.0, MAX_LOOKS) as u32;
-    let mut met: Option<(f64, DVec2)> = None;
-    let mut farthest = (f64::INFINITY, far_px);
+    let mut met: Option<Met> = None;
+    let mut farthest = Met { at_px: far_px, in_line: f64::INFINITY, seen: false };
     for i in 0..=looks {
         let mut w = w_near * (1.0 - f64::from(i) / f64::from(looks));
-        if met.is_some_and(|(met, _)| w <= met) {
+        if met.is_some_and(|met| w <= met.in_line) {
             break;
         }
         for _ in 0..LOOK_STEPS {
             let at_px = place(w);
-            let in_key = image.at(at_px).inverse_depth;
-            let found = in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
-            if found < farthest.0 {
-                farthest = (found, at_px);
+            let found = in_line(image.at(at_px).inverse_depth);
+            if found < farthest.in_line {
+                farthest = Met { at_px, in_line: found, seen: false };
             }
             if (found - w).abs() * px_per_w < MEETS_PX {
-                if met.is_none_or(|(met, _)| found > met) {
-                    met = Some((found, at_px));
+                if met.is_none_or(|met| found > met.in_line) && ideal.contains(at_px) {
+                    met = Some(Met { at_px, in_line: found, seen: true });
                 }
                 break;
             }
             w = found;
         }
     }
-    met.unwrap_or(farthest).1
+    met.unwrap_or(farthest)
 }
 
-/// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and over the exposure, whose
-/// poses are `nodes`, equally far apart in time.
+/// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and over the exposure.
 #[must_use]
-pub fn gather_edges(
-    uv: DVec2,
-    d_uv: [DVec2; 2],
-    nodes: &[(DMat3, DVec3)],
-    count: u32,
-    w_near: f64,
-    image: &FineImage<'_>,
-    ideal: &IdealGeometry,
-) -> DVec3 {
+pub fn gather_edges(uv: DVec2, d_uv: [DVec2; 2], keys: &Keys<'_>, count: u32, ideal: &IdealGeometry) -> DVec3 {
     let mut sum = DVec3::ZERO;
     for i in 0..count {
         let (place, share) = ray_place(i, count);
-        let along = share * nodes.len().saturating_sub(1) as f64;
-        let node = (along as usize).min(nodes.len().saturating_sub(2));
-        let (Some(&a), b) = (nodes.get(node), nodes.get(node + 1)) else { continue };
-        let pose = b.map_or(a, |b| {
-            let t = along - node as f64;
-            (a.0 * (1.0 - t) + b.0 * t, a.1.lerp(b.1, t))
-        });
         let ray = uv + place.x * d_uv[0] + place.y * d_uv[1];
-        sum += image.at(first_surface_px(ray, pose, w_near, image, ideal)).color;
+        if let Some((key, met)) = first_surface_of_keys(ray, share, keys, ideal) {
+            sum += keys.views[key].image.at(met.at_px).color;
+        }
     }
     sum / f64::from(count.max(1))
 }
@@ -176,7 +234,7 @@ mod tests {
                 if border_px.abs() < 0.3 {
                     continue;
                 }
-                let at_px = first_surface_px(DVec2::new(u, 0.01), pose, 1.02 * ROOF, &image, &IDEAL);
+                let at_px = first_surface(DVec2::new(u, 0.01), pose, ROOF, &image, &IDEAL).at_px;
                 let seen = image.at(at_px);
                 let roof = border_px < 0.0;
                 assert_eq!(seen.inverse_depth, if roof { ROOF } else { GROUND }, "shift {shift_m}, u {u}: {at_px}");
@@ -192,17 +250,22 @@ mod tests {
         let samples = image(2);
         let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples };
         let pixel = 1.0 / IDEAL.focal_px.x;
+        let of = |nodes: &[(DMat3, DVec3)], uv: DVec2| {
+            let views = [KeyView { nodes, image }];
+            let keys = Keys { views: &views, line_share: 0.5, exposure_share: 1.0, nearest_w: ROOF };
+            gather_edges(uv, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &keys, 64, &IDEAL)
+        };
         let still = [(DMat3::IDENTITY, DVec3::ZERO)];
         for tenth in -5..=5 {
             let uv = DVec2::new(f64::from(tenth) * 0.1 * pixel, 0.0);
-            let found = gather_edges(uv, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &still, 64, 1.02 * ROOF, &image, &IDEAL);
+            let found = of(&still, uv);
             let share = 0.5 - f64::from(tenth) * 0.1;
             // Eight columns of samples a pixel.
             assert!((found.x - share).abs() < 0.13, "{tenth}: {found} {share}");
         }
         // The border runs over two pixels within the exposure.
         let moving = [-1.0, 1.0].map(|px| (DMat3::IDENTITY, DVec3::new(px * pixel / ROOF, 0.0, 0.0)));
-        let found = gather_edges(DVec2::ZERO, [DVec2::new(pixel, 0.0), DVec2::new(0.0, pixel)], &moving, 64, 1.02 * ROOF, &image, &IDEAL);
+        let found = of(&moving, DVec2::ZERO);
         assert!((found.x - 0.5).abs() < 0.05, "{found}");
     }
 
@@ -234,7 +297,7 @@ mod tests {
         let samples = image(1);
         let image = FineImage { size_px: IDEAL.size_px, scale: 1, samples: &samples };
         for uv in [DVec2::NAN, DVec2::splat(f64::INFINITY), DVec2::splat(1e300)] {
-            let at_px = first_surface_px(uv, (DMat3::IDENTITY, DVec3::splat(0.5)), 1.02 * ROOF, &image, &IDEAL);
+            let at_px = first_surface(uv, (DMat3::IDENTITY, DVec3::splat(0.5)), ROOF, &image, &IDEAL).at_px;
             let _ = image.at(at_px);
         }
     }

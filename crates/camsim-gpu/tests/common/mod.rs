@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub mod rays;
+
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
@@ -132,4 +134,48 @@ pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, Ide
     session.render::<Infallible>([0], &mut keep).expect("render");
     let ideal = session.read_ideal().expect("readable").expect("drawn");
     (found.expect("one frame"), ideal)
+}
+
+/// Boxes on level ground: `side` x `side` of them, 30 m apart, turned and of different size; textures are smooth pictures.
+pub fn city(side: u32) -> Scene {
+    let mut scene = pattern(800.0);
+    let texture = scene.meshes[0].texture.clone();
+    for i in 0..side * side {
+        let [column, row] = [i % side, i / side].map(f64::from);
+        // Any irregular numbers do.
+        let vary = |k: f64| (k * 12.9898 * (1.0 + column) + 78.233 * row * k + k).sin().abs();
+        let centre = (DVec3::new(row, column, 0.0) - 0.5 * f64::from(side - 1) * DVec3::new(1.0, 1.0, 0.0)) * 30.0;
+        let half_m = [4.0 + 4.0 * vary(1.0), 4.0 + 4.0 * vary(2.0)];
+        scene.meshes.push(tower(&texture, centre, half_m, 6.0 + 24.0 * vary(3.0), 90.0 * vary(4.0)));
+    }
+    scene
+}
+
+/// Walls and roof of a box, its floor centred at `centre_ned_m`.
+fn tower(texture: &Arc<Texture>, centre_ned_m: DVec3, half_m: [f64; 2], height_m: f64, turn_deg: f64) -> Mesh {
+    let (sin, cos) = turn_deg.to_radians().sin_cos();
+    let at = |n: f64, e: f64, down: f64| {
+        let (n, e) = (n * half_m[0], e * half_m[1]);
+        [(n * cos - e * sin) as f32, (n * sin + e * cos) as f32, down as f32]
+    };
+    let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
+    let mut mesh = Mesh {
+        vertices: Vec::new(),
+        indices: Vec::new(),
+        texture: texture.clone(),
+        origin_ned_m: centre_ned_m,
+        wrap: camsim_core::scene::Wrap::Clamp,
+    };
+    let mut face = |positions: [[f32; 3]; 4], first_uv: f32| {
+        let base = mesh.vertices.len() as u32;
+        let uvs = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]].map(|[u, v]: [f32; 2]| [u + first_uv, v + 0.5 * first_uv]);
+        mesh.vertices.extend(positions.iter().zip(uvs).map(|(&position_m, uv)| camsim_core::scene::MeshVertex { position_m, uv }));
+        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i: u32| base + i));
+    };
+    for k in 0..4 {
+        let ([a, b], [c, d]) = (corners[k], corners[(k + 1) % 4]);
+        face([at(a, b, 0.0), at(c, d, 0.0), at(c, d, -height_m), at(a, b, -height_m)], 0.2 * k as f32);
+    }
+    face(corners.map(|[a, b]| at(a, b, -height_m)), 0.85);
+    mesh
 }
