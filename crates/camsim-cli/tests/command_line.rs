@@ -48,7 +48,22 @@ fn help_names_every_command_and_every_exit_code() {
     ] {
         assert!(out.contains(word), "{word} is missing in\n{out}");
     }
-    for command in ["demo", "render", "explain", "verify", "track", "lens", "camera", "apply", "compare", "bench", "reproduce", "info", "viewer", "completions"] {
+    for command in [
+        "demo",
+        "render",
+        "explain",
+        "verify",
+        "track",
+        "lens",
+        "camera",
+        "apply",
+        "compare",
+        "bench",
+        "reproduce",
+        "info",
+        "viewer",
+        "completions",
+    ] {
         let (code, out, _) = camsim([command, "--help"]);
         assert_eq!(code, 0, "{command}");
         assert!(out.contains("Usage: camsim"), "{out}");

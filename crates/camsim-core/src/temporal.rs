@@ -58,6 +58,22 @@ impl InverseDepthImage<'_> {
         let (d00, d10, d01, d11) = (load(0.0, 0.0), load(1.0, 0.0), load(0.0, 1.0), load(1.0, 1.0));
         blend_inverse_depths([d00, d10, d01, d11], t)
     }
+
+    /// The nearest texel, edges held.
+    #[must_use]
+    pub fn nearest(&self, at_px: DVec2) -> f64 {
+        let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
+        let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
+        f64::from(self.values[at.y as usize * self.size_px[0] as usize + at.x as usize])
+    }
+
+    /// Largest less smallest of the four texels around a position.
+    #[must_use]
+    pub fn spread(&self, at_px: DVec2) -> f64 {
+        let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].map(|half| self.nearest(at_px + DVec2::from_array(half)));
+        let [a, b, c, d] = corners;
+        a.max(b).max(c).max(d) - a.min(b).min(c).min(d)
+    }
 }
 
 /// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the way right and down.
@@ -76,22 +92,6 @@ pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> 
             (false, true) => d01,
             (true, true) => d11,
         }
-    }
-
-    /// The nearest texel, edges held.
-    #[must_use]
-    pub fn nearest(&self, at_px: DVec2) -> f64 {
-        let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
-        let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
-        f64::from(self.values[at.y as usize * self.size_px[0] as usize + at.x as usize])
-    }
-
-    /// Largest less smallest of the four texels around a position.
-    #[must_use]
-    pub fn spread(&self, at_px: DVec2) -> f64 {
-        let corners = [[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]].map(|half| self.nearest(at_px + DVec2::from_array(half)));
-        let [a, b, c, d] = corners;
-        a.max(b).max(c).max(d) - a.min(b).min(c).min(d)
     }
 }
 
