@@ -1,5 +1,7 @@
 //! Error against samples: the law, and whether the error that the oracle states is the one it makes.
 
+use std::sync::LazyLock;
+
 use camsim_core::{
     reference::{Oracle, RenderOptions},
     scenario::Scenario,
@@ -51,12 +53,21 @@ fn errors_dn(oracle: &Oracle, truth: &[DVec3], samples: u32) -> (f64, f64) {
     (255.0 * (squares.sum::<f64>() / truth.len() as f64).sqrt(), convergence.rms_error_dn)
 }
 
-fn check(name: &str, scene: Scene, height_m: f64) {
-    let oracle = Oracle::new(sequence(camera(), Steady::moving(height_m), scene)).unwrap();
+fn oracle(scene: Scene, height_m: f64) -> Oracle {
+    Oracle::new(sequence(camera(), Steady::moving(height_m), scene)).unwrap()
+}
+
+/// A town and what its pixels are; two tests look at it.
+static TOWN: LazyLock<(Oracle, Vec<DVec3>)> = LazyLock::new(|| {
+    let oracle = oracle(town(60), 150.0);
     let truth = by_grid(&oracle);
+    (oracle, truth)
+});
+
+fn check(name: &str, oracle: &Oracle, truth: &[DVec3]) {
     eprintln!("{name}: samples a pixel, RMS error, stated error (1/255)");
     let counts = [32, 64, 128, 256, 512, 1024];
-    let errors: Vec<(f64, f64)> = counts.iter().map(|&samples| errors_dn(&oracle, &truth, samples)).collect();
+    let errors: Vec<(f64, f64)> = counts.iter().map(|&samples| errors_dn(oracle, truth, samples)).collect();
     for (samples, (found, stated)) in counts.iter().zip(&errors) {
         eprintln!("  {samples:5} {found:8.3} {stated:8.3}");
     }
@@ -76,19 +87,19 @@ fn check(name: &str, scene: Scene, height_m: f64) {
 #[test]
 fn error_falls_with_samples_by_the_law_and_is_stated_honestly() {
     // Squares of a third of a pixel to two pixels: the mean over the area is what counts.
-    check("fine pattern", plane(400.0), 180.0);
-    check("town", town(60), 150.0);
+    let pattern = oracle(plane(400.0), 180.0);
+    check("fine pattern", &pattern, &by_grid(&pattern));
+    check("town", &TOWN.0, &TOWN.1);
 }
 
 /// What a tolerance promises, and that work goes where it is needed.
 #[test]
 fn pixels_are_refined_until_the_tolerance_is_kept() {
-    let oracle = Oracle::new(sequence(camera(), Steady::moving(150.0), town(60))).unwrap();
-    let truth = by_grid(&oracle);
+    let (oracle, truth) = &*TOWN;
     for tolerance_dn in [4.0, 1.0] {
         let options = RenderOptions { tolerance_dn, max_samples: 8192, photometric: false, ..RenderOptions::default() };
         let (frame, convergence) = oracle.render_reported(0, &options);
-        let squares = frame.color_rgba.chunks_exact(4).zip(&truth).map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
+        let squares = frame.color_rgba.chunks_exact(4).zip(truth).map(|(found, truth)| (f64::from(found[0]) - truth.x).powi(2));
         let rms_dn = 255.0 * (squares.sum::<f64>() / truth.len() as f64).sqrt();
         let mean = convergence.samples as f64 / convergence.pixels as f64;
         eprintln!("tolerance {tolerance_dn}: {rms_dn:.3} with {mean:.0} samples a pixel, {} unfinished", convergence.unfinished);

@@ -7,4 +7,5 @@ mod closed_form;
 mod convergence;
 mod fixtures;
 mod hostile;
+mod measuring;
 mod planted_faults;
