@@ -42,3 +42,38 @@ impl TemporalStage {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Auto;
+
+    #[test]
+    fn what_is_named_is_taken_and_nothing_else() {
+        let stage = |edit: fn(&mut QualitySpec)| {
+            let mut quality = QualitySpec::default();
+            edit(&mut quality);
+            temporal_stage(&quality)
+        };
+        assert_eq!(stage(|_| {}), None);
+        assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Reproject)), None);
+        assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Linear)), Some(TemporalStage::Linear));
+        assert_eq!(stage(|q| q.solver = Auto::Value(Solver::Rk2)), Some(TemporalStage::Rk2));
+        assert_eq!(stage(|q| q.iterations = Auto::Value(3)), Some(TemporalStage::Reproject { iterations: 3 }));
+        assert_eq!(stage(|q| q.preset = Preset::Paper), Some(TemporalStage::Rk2));
+    }
+
+    #[test]
+    fn only_the_constant_twist_solvers_look_beside_the_point() {
+        let twist = Twist { rate_rad_s: glam::DVec3::new(0.0, 0.0, 1.0), ..Twist::default() };
+        let uv = DVec2::new(0.5, 0.0);
+        let at = |stage: TemporalStage| stage.displaced(uv, 0.0, &twist, 0.1);
+        assert_eq!(at(TemporalStage::Rotation), None);
+        assert_eq!(at(TemporalStage::Reproject { iterations: 2 }), None);
+        // Turning to the right about the optical axis, the point was 0.1 rad further clockwise before: u' = u, v' = v + 0.05.
+        let linear = at(TemporalStage::Linear).unwrap_or_default();
+        assert!(linear.distance(DVec2::new(0.5, 0.05)) < 1e-12, "{linear}");
+        let rk2 = at(TemporalStage::Rk2).unwrap_or_default();
+        assert!(rk2.distance(DVec2::new(0.5 * 0.1_f64.cos(), 0.5 * 0.1_f64.sin())) < 1e-4, "{rk2}");
+    }
+}

@@ -59,3 +59,31 @@ pub(super) fn blur_stage(shutter: &Shutter, quality: &QualitySpec, skipped: &mut
 pub(super) fn fog(scene: &Scene) -> Option<LinearFog> {
     scene.fog_visibility_m.map(|end_m| LinearFog { sky_stored: scene.sky_linear.map(srgb_from_linear), end_m })
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::scenario::{Auto, CameraSpec, ShutterSpec};
+
+    #[test]
+    fn the_ideal_frame_is_the_papers() {
+        let spec = CameraSpec { principal_point_px: Some([305.099, 226.236]), ..CameraSpec::default() };
+        let ideal = ideal_geometry(&CameraModel::from_spec(&spec).unwrap());
+        // As the paper's program renders it.
+        assert_eq!((ideal.size_px, ideal.principal_px), ([1088, 816], DVec2::new(543.5, 407.5)));
+    }
+
+    #[test]
+    fn an_exposure_takes_a_hundred_samples_or_as_many_as_asked_for() {
+        let shutter = |exposure_ms| Shutter::from_spec(&ShutterSpec { exposure_ms, ..ShutterSpec::default() }, 30.0, [640, 480]).unwrap();
+        let samples = |blur_samples, exposure_ms| {
+            let quality = QualitySpec { blur_samples, ..QualitySpec::default() };
+            blur_stage(&shutter(exposure_ms), &quality, &mut Vec::new()).map(|blur| (blur.nodes, blur.max_samples))
+        };
+        assert_eq!(samples(Auto::Auto, 8.0), Some((2, 100)));
+        assert_eq!(samples(Auto::Value(10), 8.0), Some((2, 10)));
+        assert_eq!(samples(Auto::Value(10), 0.0), None);
+    }
+}

@@ -237,6 +237,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     check.require(quality.iterations == Auto::Auto, "quality.iterations", || {
         "does not go with quality.preset = \"paper\", which looks the depth up once; leave it out".into()
     });
+    check.require(matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)), "quality.key_frames", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
     check.require(matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)), "quality.footprint_taps", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
