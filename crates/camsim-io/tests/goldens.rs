@@ -13,11 +13,13 @@ use std::{
 
 use camsim_core::{
     apply::{IdealFrame, Motion, Pipeline, Settings},
+    camera::CameraModel,
     frame::RenderedFrame,
     photometric::vignette_weights,
     scenario::{CameraSpec, FieldOr, LensModel, LensSpec, PhotometricSpec, Preset, ShutterSpec, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
+    temporal::displacement,
 };
 use camsim_io::{frame_file::read_frame, pictures::read_gray_image};
 use glam::{DVec2, DVec3};
@@ -145,21 +147,31 @@ enum Fault {
     VignetteBorder,
     /// Sky is decided by the *filtered* alpha, so that horizon pixels mix with the colour that cleared texels hide, or become all sky.
     SkyAfterFilter,
-    /// Filtering there has eight bits, so an alpha within half a level of one half may count as sky ...
+    /// Filter weights there have eight bits, up to half a step off in either direction, so an alpha within a level of one half may be sky ...
     TieIsSky,
     /// ... or as ground.
     TieIsGround,
+    /// Sky is 65.281 km away, what its depth buffer was cleared to, and moves with translation: here by up to half a pixel.
+    SkyIsNear,
     /// The fog's ray is taken from the principal point, where the coordinate counts from the middle of the picture.
     FogCentre,
 }
 
-const FAULTS: [Fault; 6] =
-    [Fault::VignetteJump, Fault::VignetteBorder, Fault::SkyAfterFilter, Fault::TieIsSky, Fault::TieIsGround, Fault::FogCentre];
+const FAULTS: [Fault; 7] = [
+    Fault::VignetteJump,
+    Fault::VignetteBorder,
+    Fault::SkyAfterFilter,
+    Fault::TieIsSky,
+    Fault::TieIsGround,
+    Fault::SkyIsNear,
+    Fault::FogCentre,
+];
 
 /// Gather, fog and photometric of the paper, written once more, with faults on request.
 struct Model<'a> {
     golden: &'a Golden,
     pipeline: &'a Pipeline<'a>,
+    camera: &'a CameraModel,
 }
 
 impl Model<'_> {
@@ -167,26 +179,38 @@ impl Model<'_> {
     fn levels(&self, pixel: [u32; 2], faults: &[Fault]) -> Option<[f64; 3]> {
         let has = |fault| faults.contains(&fault);
         let n = |key: &str| self.golden.numbers[key];
-        let begin = self.pipeline.source(pixel, -0.5)?;
-        let end = self.pipeline.source(pixel, 0.5)?;
+        let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
+        let inverse_depth = self.pipeline.source(pixel, 0.0)?.inverse_depth;
+        let sky = inverse_depth == 0.0;
+        let at_phase = |phase: f64| {
+            if !(sky && has(Fault::SkyIsNear)) {
+                return Some(self.pipeline.source(pixel, phase)?.at_px);
+            }
+            // That program's row times, from the ideal frame's instant.
+            let row = f64::from(pixel[1]);
+            let lag_s = if pixel[1].is_multiple_of(2) { n("ti") } else { 0.0 };
+            let dt_s = 0.5 * n("ti") + n("tr") * ((row + 0.5) / n("height") - 0.5) - lag_s + phase * n("te");
+            let twist = self.golden.motion.twist_at(0.0);
+            let moved = displacement::rk2(uv, 1.0 / 65_281.0, &twist, dt_s, 2.5_f64.to_radians());
+            Some(self.golden.ideal.geometry.px_from_point(moved.extend(1.0)))
+        };
+        let (begin_px, end_px) = (at_phase(-0.5)?, at_phase(0.5)?);
         let samples = n("extra_sampling_points") + 2.0;
         // Alpha below which a filtered texel is sky; `None` decides texel by texel, before filtering.
         let sky_below = has(Fault::SkyAfterFilter).then(|| match (has(Fault::TieIsSky), has(Fault::TieIsGround)) {
-            (true, false) => 128.0,
-            (false, true) => 127.0,
+            (true, false) => 128.5,
+            (false, true) => 126.5,
             _ => 127.5,
         });
         let mut sum = DVec3::ZERO;
         for i in 0..samples as u32 {
-            sum += self.color(begin.at_px.lerp(end.at_px, f64::from(i) / (samples - 1.0)), sky_below);
+            sum += self.color(begin_px.lerp(end_px, f64::from(i) / (samples - 1.0)), sky_below);
         }
         let mut color = sum / samples;
         if n("fog_end") > 0.0 {
-            let camera = camsim_core::camera::CameraModel::from_spec(&self.golden.spec).unwrap();
-            let uv = camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
             let wrong = DVec2::new(0.5 * n("width") - n("ox"), 0.5 * n("height") - n("oy")) / DVec2::new(n("fx"), n("fy"));
             let ray = if has(Fault::FogCentre) { uv + wrong } else { uv };
-            let share = (ray.extend(1.0).length() / begin.inverse_depth / n("fog_end")).clamp(0.0, 1.0);
+            let share = (ray.extend(1.0).length() / inverse_depth / n("fog_end")).clamp(0.0, 1.0);
             color = color.lerp(255.0 * DVec3::from_array(FOG), share);
         }
         let weight = self.vignette(pixel, has(Fault::VignetteJump), has(Fault::VignetteBorder));
@@ -266,8 +290,8 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
     for golden in &goldens {
         let pipeline = Pipeline::new(&golden.spec, &golden.ideal, &golden.motion, &golden.paper).unwrap();
         let rendered = pipeline.render(Some(&golden.vignette));
-        let camera = camsim_core::camera::CameraModel::from_spec(&golden.spec).unwrap();
-        let model = Model { golden, pipeline: &pipeline };
+        let camera = CameraModel::from_spec(&golden.spec).unwrap();
+        let model = Model { golden, pipeline: &pipeline, camera: &camera };
         let (mut within, mut empty) = ([0_u32; 3], 0_u32);
         let mut causes: BTreeMap<String, u32> = BTreeMap::new();
         let mut missed = 0;
@@ -346,9 +370,9 @@ fn in_fog(golden: &Golden) -> IdealFrame {
     let geometry = ideal.geometry;
     for (i, (color, w)) in ideal.color_rgba.chunks_exact_mut(4).zip(&ideal.inverse_depth).enumerate() {
         let at_px = DVec2::new((i as u32 % geometry.size_px[0]).into(), (i as u32 / geometry.size_px[0]).into());
-        let range_m = ((at_px - geometry.principal_px) / geometry.focal_px).extend(1.0).length() / f64::from(*w);
+        let uv = (at_px - geometry.principal_px) / geometry.focal_px;
         let stored = DVec3::from_array([color[0], color[1], color[2]].map(|v| f64::from(srgb_from_linear(v))));
-        let foggy = fog.over(stored, range_m).to_array().map(|v| linear_from_srgb(v as f32));
+        let foggy = fog.over(stored, uv, f64::from(*w)).to_array().map(|v| linear_from_srgb(v as f32));
         color[..3].copy_from_slice(&foggy);
     }
     ideal

@@ -11,16 +11,18 @@
 //! | vignette, light, noise | on stored values | on light |
 //! | fog | linear in slant range, after the blur, by the depth above | a part of the ideal frame |
 //!
-//! Row times, lens inverse, principal points and the vignette's rule are camsim's own: the paper means the same.
+//! Row times, lens inverse, principal points and the vignette's rule are camsim's own: the paper means the same. (The scenario's preset of
+//! this name also solves the lens as the paper does, in every frame, because its time and its errors are of interest there.)
 
 use glam::{DVec2, DVec3};
 
 use super::Pipeline;
+use crate::temporal::paper::{gather_straight, linear_fog};
 
 /// Samples over the exposure, as in the paper's section 8.9.
 pub const BLUR_SAMPLES: u32 = 100;
 
-/// `mix(colour, fog, clamp(d / end_m, 0, 1))`, d = slant range; in stored values.
+/// `mix(colour, fog, clamp(d / end_m, 0, 1))`, d = slant range; on stored values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearFog {
     /// Distance from which on nothing but fog is seen, metres.
@@ -30,29 +32,21 @@ pub struct LinearFog {
 }
 
 impl LinearFog {
-    /// Fog over a colour at a slant range (infinite for the sky).
+    /// Fog over a stored colour that a ray meets at an inverse planar depth (0: the sky).
     #[must_use]
-    pub fn over(&self, color: DVec3, range_m: f64) -> DVec3 {
-        color.lerp(self.color, (range_m / self.end_m).clamp(0.0, 1.0))
+    pub fn over(&self, color: DVec3, uv: DVec2, inverse_depth: f64) -> DVec3 {
+        linear_fog(color, self.color, uv, inverse_depth, self.end_m)
     }
 }
 
 impl Pipeline<'_> {
-    /// Mean of stored values over the exposure, with fog. `None` if either end of the path is outside of the ideal frame.
+    /// Mean of stored values over the exposure, with fog. `None` if either end of the path is outside of the ideal frame; between them
+    /// nothing can be, because a rectangle holds the segment between any two of its points.
     pub(super) fn gather_paper(&self, uv: DVec2, dt_s: f64) -> Option<DVec3> {
         let half_s = 0.5 * self.shutter.exposure_s();
-        let begin = self.source_of_ray(uv, dt_s - half_s)?.at_px;
-        let end = self.source_of_ray(uv, dt_s + half_s)?.at_px;
-        let samples = if half_s > 0.0 { self.settings.blur_samples.unwrap_or(BLUR_SAMPLES).max(2) } else { 1 };
-        let color = self.stored();
-        let sum: DVec3 = match samples {
-            1 => color.sample(begin),
-            // A rectangle holds the segment between any two of its points, so no sample is outside.
-            _ => (0..samples).map(|i| color.sample(begin.lerp(end, f64::from(i) / f64::from(samples - 1)))).sum(),
-        };
-        let mean = sum / f64::from(samples);
-        let Some(fog) = &self.settings.fog else { return Some(mean) };
-        let range_m = uv.extend(1.0).length() / self.inverse_depth_of_ray(uv);
-        Some(fog.over(mean, range_m))
+        let ends_px = [self.source_of_ray(uv, dt_s - half_s)?.at_px, self.source_of_ray(uv, dt_s + half_s)?.at_px];
+        let samples = if half_s > 0.0 { self.settings.blur_samples.unwrap_or(BLUR_SAMPLES) } else { 1 };
+        let mean = gather_straight(ends_px, samples, &self.stored());
+        Some(self.settings.fog.map_or(mean, |fog| fog.over(mean, uv, self.inverse_depth_of_ray(uv))))
     }
 }

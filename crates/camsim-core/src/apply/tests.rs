@@ -186,8 +186,8 @@ fn a_turn_within_the_exposure_is_an_arc() {
 #[test]
 fn fog_belongs_to_the_papers_preset() {
     let fog = paper::LinearFog { end_m: 100.0, color: DVec3::new(0.5, 0.6, 0.7) };
-    assert_eq!(fog.over(DVec3::ZERO, 50.0), fog.color * 0.5);
-    assert_eq!(fog.over(DVec3::ZERO, f64::INFINITY), fog.color);
+    assert_eq!(fog.over(DVec3::ZERO, DVec2::ZERO, 0.02), fog.color * 0.5);
+    assert_eq!(fog.over(DVec3::ZERO, DVec2::ONE, 0.0), fog.color);
     let spec = camera([4, 3], 10.0, ShutterSpec::default());
     let ideal = frame([4, 3], 10.0, |_| (0.02, [0.0; 3]));
     let motion = Motion::Twist(Twist::default());
