@@ -198,13 +198,13 @@ fn the_built_in_flight_is_tracked_and_explained() {
 fn the_predicted_error_is_explained_by_cause() {
     let scenario = assets().join("pattern.toml");
     let explain = |more: &[&str]| {
-        let (code, out, err) = camsim([&["explain", text(&scenario)], more].concat());
+        let (code, out, err) = camsim([&["explain", text(&scenario)][..], more].concat());
         assert_eq!(code, 0, "{err}");
         out
     };
     let out = explain(&[]);
     assert!(out.contains("predicted error") && out.contains("within the tolerance") && out.contains("single precision"), "{out}");
-    let of = |more: &[&str]| serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"], more].concat())).unwrap()["plan"].clone();
+    let of = |more: &[&str]| serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"][..], more].concat())).unwrap()["plan"].clone();
     let plan = of(&[]);
     let predicted = &plan["predicted"];
     let total_px = predicted["total_px"].as_f64().unwrap();

@@ -132,7 +132,7 @@ fn the_measured_error_stands_beside_the_predicted_one() {
     let verify = |more: &[&str]| {
         let small =
             ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--set", "camera.principal_point_px=[47.5, 35.5]"];
-        camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "3,20"], &small[..], more].concat())
+        camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "3,20"][..], &small, more].concat())
     };
     let (code, out, err) = verify(&["--json"]);
     assert_eq!(code, 0, "{out}{err}");
