@@ -400,8 +400,18 @@ mod tests {
         let json = serde_json::to_value(report()).expect("JSON");
         assert!(json["adapter"].is_string() && json["version"].is_string());
         let keys = [
-            "case", "preset", "width", "height", "ms_per_frame_p50", "ms_per_frame_p99", "cpu_ms_per_frame", "coord_rms_px", "coord_p99_px",
-            "coord_max_px", "psnr_db", "predicted_px",
+            "case",
+            "preset",
+            "width",
+            "height",
+            "ms_per_frame_p50",
+            "ms_per_frame_p99",
+            "cpu_ms_per_frame",
+            "coord_rms_px",
+            "coord_p99_px",
+            "coord_max_px",
+            "psnr_db",
+            "predicted_px",
         ];
         for row in json["rows"].as_array().expect("rows") {
             for key in keys {

@@ -186,28 +186,96 @@ fn recipes() -> Vec<Recipe> {
     everything.photometric = PhotometricSpec { noise_sigma: 0.01, vignette: Some("in-memory".into()), ..PhotometricSpec::default() };
     let everything = shaking(shaking(everything, Axis::Pitch, 0.05, 60.0), Axis::Yaw, 0.05, 45.0);
     let brown = |focal_px, principal, coefficients: &[f64]| lens(LensModel::BrownConrady, focal_px, principal, coefficients);
-    let of_lens = |name, about, camera| Recipe { name, group: Group::Lens, about, ground: Plane, flight: flight(150.0, 30.0, still), camera };
+    let of_lens =
+        |name, about, camera| Recipe { name, group: Group::Lens, about, ground: Plane, flight: flight(150.0, 30.0, still), camera };
     let case = |name, group, about, ground, flight, camera| Recipe { name, group, about, ground, flight, camera };
     vec![
-        case("roll-36", Smooth, "36 deg of roll about the optical axis within a frame", Plane, flight(150.0, 0.0, [0.0, 0.0, 36.0]), nadir(1000.0, 0.0)),
+        case(
+            "roll-36",
+            Smooth,
+            "36 deg of roll about the optical axis within a frame",
+            Plane,
+            flight(150.0, 0.0, [0.0, 0.0, 36.0]),
+            nadir(1000.0, 0.0),
+        ),
         case("pitch-36", Smooth, "36 deg of pitch within a frame", Plane, flight(150.0, 0.0, [0.0, 36.0, 0.0]), nadir(1000.0, 0.0)),
         case("plane-30", Smooth, "30 m/s over a plane, 33 ms readout", Plane, flight(150.0, 30.0, still), nadir(33.0, 0.0)),
         case("terrain-100", Smooth, "100 m/s over hills, 33 ms", hills, flight(150.0, 100.0, still), nadir(33.0, 0.0)),
-        case("combined-58", Smooth, "40 m/s and 58 deg/s over hills, 100 ms", hills, flight(150.0, 40.0, [30.0, 25.0, 43.0]), nadir(100.0, 0.0)),
+        case(
+            "combined-58",
+            Smooth,
+            "40 m/s and 58 deg/s over hills, 100 ms",
+            hills,
+            flight(150.0, 40.0, [30.0, 25.0, 43.0]),
+            nadir(100.0, 0.0),
+        ),
         case("interlace", Smooth, "40 m/s, 20 deg/s, fields 16.7 ms apart", hills, flight(150.0, 40.0, [0.0, 0.0, 20.0]), interlaced),
-        case("vibration-100", Vibration, "100 Hz, 0.2 deg over hills, 33 ms", hills, flight(150.0, 30.0, still), shaking(nadir(33.0, 0.0), Axis::Pitch, 0.2, 100.0)),
-        case("vibration-200", Vibration, "200 Hz, 0.1 deg over houses, 33 ms, exposure 5 ms", Town, flight(60.0, 15.0, still), shaking(nadir(33.0, 5.0), Axis::Roll, 0.1, 200.0)),
-        case("buildings-15", Buildings, "15 m/s, 60 m above houses, straight down, 33 ms", Town, flight(60.0, 15.0, still), nadir(33.0, 0.0)),
-        case("buildings-40", Buildings, "40 m/s, 35 m above ground, 50 deg down, 33 ms", Town, flight(35.0, 40.0, still), camera(-50.0, 33.0, 0.0)),
-        case("buildings-60", Buildings, "60 m/s, 35 m above ground, 35 deg down with the skyline, 33 ms", Town, flight(35.0, 60.0, still), camera(-35.0, 33.0, 0.0)),
+        case(
+            "vibration-100",
+            Vibration,
+            "100 Hz, 0.2 deg over hills, 33 ms",
+            hills,
+            flight(150.0, 30.0, still),
+            shaking(nadir(33.0, 0.0), Axis::Pitch, 0.2, 100.0),
+        ),
+        case(
+            "vibration-200",
+            Vibration,
+            "200 Hz, 0.1 deg over houses, 33 ms, exposure 5 ms",
+            Town,
+            flight(60.0, 15.0, still),
+            shaking(nadir(33.0, 5.0), Axis::Roll, 0.1, 200.0),
+        ),
+        case(
+            "buildings-15",
+            Buildings,
+            "15 m/s, 60 m above houses, straight down, 33 ms",
+            Town,
+            flight(60.0, 15.0, still),
+            nadir(33.0, 0.0),
+        ),
+        case(
+            "buildings-40",
+            Buildings,
+            "40 m/s, 35 m above ground, 50 deg down, 33 ms",
+            Town,
+            flight(35.0, 40.0, still),
+            camera(-50.0, 33.0, 0.0),
+        ),
+        case(
+            "buildings-60",
+            Buildings,
+            "60 m/s, 35 m above ground, 35 deg down with the skyline, 33 ms",
+            Town,
+            flight(35.0, 60.0, still),
+            camera(-35.0, 33.0, 0.0),
+        ),
         case("delay-1s", LongWindow, "1 s of delay, 50 m/s over hills", hills, flight(150.0, 50.0, still), one_second_late),
-        case("rolling-1s", LongWindow, "1 s of readout, 100 m/s, 1000 m above hills", high_hills, flight(1000.0, 100.0, [3.0, 0.0, 5.0]), nadir(1000.0, 0.0)),
-        case("rolling-1s-buildings", LongWindow, "1 s of readout, 15 m/s, 100 m above houses", Town, flight(100.0, 15.0, still), nadir(1000.0, 0.0)),
+        case(
+            "rolling-1s",
+            LongWindow,
+            "1 s of readout, 100 m/s, 1000 m above hills",
+            high_hills,
+            flight(1000.0, 100.0, [3.0, 0.0, 5.0]),
+            nadir(1000.0, 0.0),
+        ),
+        case(
+            "rolling-1s-buildings",
+            LongWindow,
+            "1 s of readout, 15 m/s, 100 m above houses",
+            Town,
+            flight(100.0, 15.0, still),
+            nadir(1000.0, 0.0),
+        ),
         case("exposure-1", Exposure, "1 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 1.0)),
         case("exposure-10", Exposure, "10 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 10.0)),
         case("exposure-100", Exposure, "100 ms at 40 m/s and 30 deg/s", hills, flight(150.0, 40.0, [0.0, 30.0, 0.0]), nadir(33.0, 100.0)),
         of_lens("lens-none", "no distortion", nadir(33.0, 0.0)),
-        of_lens("lens-euroc", "EuRoC's cam0", brown(458.654, [310.0, 248.375], &[-0.283_408_11, 0.073_959_07, 0.000_193_59, 1.761_871_14e-5])),
+        of_lens(
+            "lens-euroc",
+            "EuRoC's cam0",
+            brown(458.654, [310.0, 248.375], &[-0.283_408_11, 0.073_959_07, 0.000_193_59, 1.761_871_14e-5]),
+        ),
         of_lens("lens-s3", "the paper's fisheye (Agisoft's calibration)", brown(FOCAL_PX, [305.599, 226.736], &S3)),
         of_lens("lens-gopro-fold", "a barrel that folds inside the image", brown(300.0, [320.1, 235.1], &[-0.26, 0.03, 0.0006, -0.0004])),
         of_lens(
@@ -216,8 +284,22 @@ fn recipes() -> Vec<Recipe> {
             lens(LensModel::KannalaBrandt, 450.0, centre, &[0.003_482_389, 0.000_715_035, -0.002_053_236, 0.000_202_937]),
         ),
         of_lens("lens-tangential", "p1 = 0.1, p2 = -0.1", brown(450.0, centre, &[-0.1, 0.01, 0.1, -0.1])),
-        case("blender-plane", AllEffects, "a plane, 33 ms readout, 8 ms exposure", Plane, flight(150.0, 30.0, [0.0, 0.0, 20.0]), nadir(33.0, 8.0)),
-        case("all-effects", AllEffects, "fisheye, shake, 33 ms, 8 ms, vignette, noise, houses on hills", TownOnHills, flight(120.0, 40.0, [0.0, 10.0, 15.0]), everything),
+        case(
+            "blender-plane",
+            AllEffects,
+            "a plane, 33 ms readout, 8 ms exposure",
+            Plane,
+            flight(150.0, 30.0, [0.0, 0.0, 20.0]),
+            nadir(33.0, 8.0),
+        ),
+        case(
+            "all-effects",
+            AllEffects,
+            "fisheye, shake, 33 ms, 8 ms, vignette, noise, houses on hills",
+            TownOnHills,
+            flight(120.0, 40.0, [0.0, 10.0, 15.0]),
+            everything,
+        ),
     ]
 }
 
@@ -313,7 +395,8 @@ mod tests {
             let megapixels = plan.ideal.size_px.iter().map(|&side| f64::from(side)).product::<f64>() / 1e6;
             assert!(megapixels < 4.0, "{}: an ideal frame of {:?} px", case.name, plan.ideal.size_px);
             let silhouettes = plan.edges != EdgeStage::None;
-            let of_houses = case.sequence.scene.meshes.len() > 1 || case.group == Group::AllEffects && case.sequence.scene.terrain.is_some();
+            let of_houses =
+                case.sequence.scene.meshes.len() > 1 || case.group == Group::AllEffects && case.sequence.scene.terrain.is_some();
             assert!(silhouettes || !of_houses, "{}: {:?}", case.name, plan.edges);
             match case.name {
                 "roll-36" | "pitch-36" => {

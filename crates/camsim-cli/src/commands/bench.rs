@@ -78,9 +78,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.note(report.summary());
     match report.violations.len() {
-        beaten if args.check && beaten > 0 => {
-            Err(Failure::failed(anyhow::anyhow!("{beaten} rows that the plan chose are beaten in both time and error; the table lists them")))
-        }
+        beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow::anyhow!(
+            "{beaten} rows that the plan chose are beaten in both time and error; the table lists them"
+        ))),
         _ => Ok(()),
     }
 }

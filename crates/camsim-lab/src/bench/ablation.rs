@@ -117,7 +117,13 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
     for count in 2..=EFFECTS.len() {
         let all = count == EFFECTS.len();
         let last = EFFECTS[count - 1].name();
-        names.push(if all { format!("... and {last}: a perfect camera") } else if count == 2 { format!("{} and {last}", EFFECTS[0].name()) } else { format!("... and {last}") });
+        names.push(if all {
+            format!("... and {last}: a perfect camera")
+        } else if count == 2 {
+            format!("{} and {last}", EFFECTS[0].name())
+        } else {
+            format!("... and {last}")
+        });
         variants.push((without(full, &EFFECTS[..count])?, false));
     }
     names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());

@@ -13,9 +13,8 @@ use crate::timing::{ms, processor_ms};
 /// Device faults.
 pub fn measure(gpu: &GpuContext, size_px: [u32; 2], rounds: usize, burst: u64) -> Result<Times, BenchError> {
     let size = 16 * u64::from(size_px[0]) * u64::from(size_px[1]);
-    let create = |usage| {
-        gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some("camsim.blit"), size, usage, mapped_at_creation: false })
-    };
+    let create =
+        |usage| gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some("camsim.blit"), size, usage, mapped_at_creation: false });
     let source = create(wgpu::BufferUsages::COPY_SRC);
     let target = create(wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST);
     let on_host = create(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);

@@ -40,9 +40,8 @@ pub fn mark_fronts(rows: &mut [Row]) {
                     !rows.iter().any(|other| {
                         comparable(row, other)
                             && other.ms_per_frame_p50 <= row.ms_per_frame_p50
-                            && error(other).is_some_and(|error| {
-                                error < own || (error <= own && other.ms_per_frame_p50 < row.ms_per_frame_p50)
-                            })
+                            && error(other)
+                                .is_some_and(|error| error < own || (error <= own && other.ms_per_frame_p50 < row.ms_per_frame_p50))
                     })
                 })
             };

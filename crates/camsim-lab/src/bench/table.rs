@@ -24,7 +24,15 @@ impl Report {
     }
 
     fn write_markdown(&self, text: &mut String) -> std::fmt::Result {
-        writeln!(text, "camsim {}, {}, {} processor threads. `camsim bench{}`, {:.0} s.", self.version, self.adapter, self.cpu_threads, if self.quick { " --quick" } else { "" }, self.elapsed_s)?;
+        writeln!(
+            text,
+            "camsim {}, {}, {} processor threads. `camsim bench{}`, {:.0} s.",
+            self.version,
+            self.adapter,
+            self.cpu_threads,
+            if self.quick { " --quick" } else { "" },
+            self.elapsed_s
+        )?;
         for rows in self.rows.chunk_by(|a, b| a.case == b.case) {
             self.case(text, rows)?;
         }
@@ -34,7 +42,8 @@ impl Report {
         self.checks(text)?;
         if !self.refused.is_empty() {
             writeln!(text, "\nNot rendered by this version:\n")?;
-            let mut reasons: Vec<(&str, &str)> = self.refused.iter().map(|refused| (refused.knob.as_str(), refused.reason.as_str())).collect();
+            let mut reasons: Vec<(&str, &str)> =
+                self.refused.iter().map(|refused| (refused.knob.as_str(), refused.reason.as_str())).collect();
             reasons.sort_unstable();
             reasons.dedup();
             for (knob, reason) in reasons {
@@ -49,12 +58,19 @@ impl Report {
         let about = self.about.get(&first.case).copied().unwrap_or_default();
         writeln!(text, "\n### {}: {about}\n", first.case)?;
         let [coords, picture] = first.compared;
-        write!(text, "{}x{}, {} rounds; errors over {coords} coordinates and {picture} pixels of the picture", first.width, first.height, first.rounds)?;
+        write!(
+            text,
+            "{}x{}, {} rounds; errors over {coords} coordinates and {picture} pixels of the picture",
+            first.width, first.height, first.rounds
+        )?;
         match first.edge_share.filter(|share| *share > 0.0) {
             Some(share) => writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?,
             None => writeln!(text, ".\n")?,
         }
-        writeln!(text, "| method | ms a frame | p99 | processor ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |")?;
+        writeln!(
+            text,
+            "| method | ms a frame | p99 | processor ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
+        )?;
         writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|---|---|")?;
         for row in rows {
             let front = match (row.coord_front, row.image_front) {
@@ -153,20 +169,38 @@ impl Report {
             self.rows_of(groups, knob).filter_map(|row| Some((row, value(row)?))).collect::<Vec<_>>()
         };
         use Group::{AllEffects, Buildings, Exposure, Lens, LongWindow, Smooth, Vibration};
-        worst("tolerance 0.001 px on smooth scenes: at most 0.001 px RMS", 1e-3, true, " px", of(&[Smooth], tight, &|row| row.coord_rms_px));
+        worst(
+            "tolerance 0.001 px on smooth scenes: at most 0.001 px RMS",
+            1e-3,
+            true,
+            " px",
+            of(&[Smooth], tight, &|row| row.coord_rms_px),
+        );
         let to_rk2 = |row: &Row| {
             let rk2 = self.row(&row.case, "rk2")?;
             Some(row.times.ratio_to(&rk2.times)[1])
         };
         worst("the same at no more than 1.5 times the time of rk2", 1.5, true, " times", of(&[Smooth], tight, &to_rk2));
-        worst("tolerance 0.001 px with buildings: at most 0.05 px RMS", 0.05, true, " px", of(&[Buildings], tight, &|row| row.coord_rms_px));
+        worst(
+            "tolerance 0.001 px with buildings: at most 0.05 px RMS",
+            0.05,
+            true,
+            " px",
+            of(&[Buildings], tight, &|row| row.coord_rms_px),
+        );
         let every = [Smooth, Vibration, Buildings, LongWindow, Exposure, Lens, AllEffects];
         worst("default: p99 away from silhouettes at most 0.05 px", 0.05, true, " px", of(&every, DEFAULT, &|row| row.smooth_p99_px));
         let over = |row: &Row| Some(row.smooth_p99_px? / row.predicted_px?);
         let all: Vec<_> = self.rows.iter().filter_map(|row| Some((row, over(row)?))).collect();
         worst("measured p99 over the predicted bound: at most 1", 1.0, true, "", all);
         worst("all effects: at least 45 dB", 45.0, false, " dB", of(&[AllEffects], DEFAULT, &|row| row.psnr_db));
-        worst("all effects: at least 40 dB within 3 px of silhouettes", 40.0, false, " dB", of(&[AllEffects], "silhouettes: 16 samples", &|row| row.edge_psnr_db));
+        worst(
+            "all effects: at least 40 dB within 3 px of silhouettes",
+            40.0,
+            false,
+            " dB",
+            of(&[AllEffects], "silhouettes: 16 samples", &|row| row.edge_psnr_db),
+        );
         self.ablation_promises(&mut promises);
         promises
     }
@@ -175,7 +209,8 @@ impl Report {
         let Some((full, rest)) = self.ablation.split_first() else { return };
         let single = &rest[..rest.len().min(super::ablation::EFFECTS.len())];
         // The upper quartile, so that noise about zero does not count as time lost.
-        let dearer: Vec<_> = single.iter().filter(|row| row.to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full.ms_per_frame_p50)).collect();
+        let dearer: Vec<_> =
+            single.iter().filter(|row| row.to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full.ms_per_frame_p50)).collect();
         let names = dearer.iter().map(|row| row.without.as_str()).collect::<Vec<_>>().join(", ");
         let measured = if dearer.is_empty() { "each does".to_owned() } else { format!("more without {names}") };
         promises.push(Promise { what: "a frame takes less time without an effect".into(), measured, kept: dearer.is_empty() });
@@ -220,14 +255,14 @@ impl Report {
         text
     }
 
-    /// RMS of the source coordinates against time, both logarithmic: for each kind of case a curve through its methods, each a geometric mean
-    /// over the cases of that kind that have it; the paper's preset stands alone.
+    /// RMS of the source coordinates against time, both logarithmic. A point is a method's geometric mean over the cases of one kind; for each kind
+    /// of case a curve joins the methods that no other beats, and the others and the paper's preset stand alone.
     ///
     /// # Errors
     /// Nothing was measured.
     pub fn plot(&self) -> Result<String, BenchError> {
         let mut series = Vec::new();
-        let mut paper = Vec::new();
+        let (mut beaten, mut paper) = (Vec::new(), Vec::new());
         let mut groups: Vec<&str> = self.rows.iter().map(|row| row.group).collect();
         groups.dedup();
         for group in groups {
@@ -245,17 +280,26 @@ impl Report {
                     rows.iter().filter(|row| row.knob == knob).filter_map(|row| Some((row.ms_per_frame_p50, row.coord_rms_px?))).collect();
                 // Means over different sets of cases would not be comparable.
                 if of_knob.len() == cases {
-                    let mean = |value: fn(&(f64, f64)) -> f64| (of_knob.iter().map(|p| value(p).max(1e-9).ln()).sum::<f64>() / cases as f64).exp();
+                    let mean =
+                        |value: fn(&(f64, f64)) -> f64| (of_knob.iter().map(|p| value(p).max(1e-9).ln()).sum::<f64>() / cases as f64).exp();
                     let point = (mean(|p| p.0), mean(|p| p.1));
                     if knob == "paper" { paper.push(point) } else { points.push(point) }
                 }
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            series.push(Series { name: group.to_owned(), points, joined: true });
+            let mut least = f64::INFINITY;
+            let (front, rest): (Vec<_>, Vec<_>) = points.into_iter().partition(|&(_, rms_px)| {
+                let better = rms_px < least;
+                least = least.min(rms_px);
+                better
+            });
+            beaten.extend(rest);
+            series.push(Series { name: group.to_owned(), points: front, joined: true });
         }
+        series.push(Series { name: "beaten by another method".to_owned(), points: beaten, joined: false });
         series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
         let plot = Plot {
-            title: format!("Error against time, {}", self.adapter),
+            title: format!("Error against time, camsim {}, {}", self.version, self.adapter.split(" (").next().unwrap_or_default()),
             x_label: "ms a frame (median)".into(),
             y_label: "RMS of the source coordinates, px".into(),
             log: [true, true],

@@ -66,8 +66,7 @@ impl Truth {
         let valid: Vec<bool> = coords.valid().collect();
         let whole = [false, true].map(|kind| near.iter().zip(&valid).filter(|(near, valid)| **valid && **near == kind).count() as u64);
         let only = chosen(near, whole);
-        let options =
-            RenderOptions { max_samples: MAX_SAMPLES, tolerance_dn: TOLERANCE_DN, only: Some(only), ..RenderOptions::default() };
+        let options = RenderOptions { max_samples: MAX_SAMPLES, tolerance_dn: TOLERANCE_DN, only: Some(only), ..RenderOptions::default() };
         let picture = oracle.render(FRAME, &options);
         Ok(Self { coords, picture, whole })
     }

@@ -161,7 +161,8 @@ fn fractal(side: u32, coarsest: u32, finest: u32, persistence: f64, seed: u64) -
     let mut sum = vec![0.0_f32; (side * side) as usize];
     let (mut periods, mut amplitude) = (coarsest.max(1), 1.0_f64);
     while periods <= finest {
-        let lattice: Vec<f32> = (0..periods * periods).map(|i| (2.0 * unit(hash(seed, u64::from(periods) << 32 | u64::from(i))) - 1.0) as f32).collect();
+        let lattice: Vec<f32> =
+            (0..periods * periods).map(|i| (2.0 * unit(hash(seed, u64::from(periods) << 32 | u64::from(i))) - 1.0) as f32).collect();
         let place = |k: u32| {
             let at = f64::from(k) * f64::from(periods) / f64::from(side);
             let t = at.fract();
@@ -213,7 +214,9 @@ mod tests {
         assert_eq!(noise, fractal(side, 2, 32, 1.0, 7));
         let at = |x: u32, y: u32| f64::from(noise[(y % side * side + x % side) as usize]);
         // Mean square difference at a lag grows with the lag for every octave that it does not yet span, and is about 2 beyond.
-        let structure = |lag: u32| (0..side * side).map(|i| (at(i % side + lag, i / side) - at(i % side, i / side)).powi(2)).sum::<f64>() / f64::from(side * side);
+        let structure = |lag: u32| {
+            (0..side * side).map(|i| (at(i % side + lag, i / side) - at(i % side, i / side)).powi(2)).sum::<f64>() / f64::from(side * side)
+        };
         let seam = (0..side).map(|y| (at(0, y) - at(side - 1, y)).powi(2)).sum::<f64>() / f64::from(side);
         assert!(seam < 2.0 * structure(1), "{seam} {}", structure(1));
         let [one, four, sixteen] = [1, 4, 16].map(structure);
