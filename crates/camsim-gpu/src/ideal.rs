@@ -201,7 +201,7 @@ impl IdealPass {
                 &self.mesh_layout,
                 &[
                     entry(0, wgpu::BindingResource::TextureView(&mesh.texture)),
-                    entry(1, sampler.clone()),
+                    entry(1, wgpu::BindingResource::Sampler(&mesh.sampler)),
                     entry(2, wgpu::BindingResource::Buffer(placement)),
                 ],
             )

@@ -1,6 +1,6 @@
 //! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
 
-use camsim_core::scene::{CHUNK_CELLS, Encoding, LEVELS, Mesh, Scene, Terrain, Texture};
+use camsim_core::scene::{CHUNK_CELLS, Encoding, LEVELS, Mesh, Scene, Terrain, Texture, Wrap};
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
@@ -43,6 +43,8 @@ pub struct MeshBuffers {
     pub count: u32,
     /// Picture.
     pub texture: wgpu::TextureView,
+    /// What it shows outside of the picture.
+    pub sampler: wgpu::Sampler,
     /// NED position of the mesh's own origin, metres.
     pub origin_ned_m: DVec3,
 }
@@ -53,18 +55,28 @@ impl SceneBuffers {
     /// # Errors
     /// [`GpuError::TooLarge`] for what the adapter cannot hold.
     pub fn new(gpu: &GpuContext, scene: &Scene) -> Result<Self, GpuError> {
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("camsim.ideal.sampler"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            anisotropy_clamp: 16,
-            ..Default::default()
-        });
+        let sampler = create_sampler(gpu, Wrap::Clamp);
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
         let meshes = scene.meshes.iter().map(|mesh| upload_mesh(gpu, mesh)).collect::<Result<_, _>>()?;
         Ok(Self { terrain, meshes, sampler })
     }
+}
+
+fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
+    let address = match wrap {
+        Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
+        Wrap::Repeat => wgpu::AddressMode::Repeat,
+    };
+    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("camsim.ideal.sampler"),
+        address_mode_u: address,
+        address_mode_v: address,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        anisotropy_clamp: 16,
+        ..Default::default()
+    })
 }
 
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
@@ -120,6 +132,7 @@ fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {
         indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
         count: mesh.indices.len() as u32,
         texture: upload_texture(gpu, &mesh.texture, "the picture of a mesh or pattern")?,
+        sampler: create_sampler(gpu, mesh.wrap),
         origin_ned_m: mesh.origin_ned_m,
     })
 }

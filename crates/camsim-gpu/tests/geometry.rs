@@ -9,6 +9,7 @@ use camsim_core::{
     mount::CameraPath,
     plan::FramePlan,
     scenario::{Axis, CameraSpec, Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec, VibrationSpec},
+    scene::Wrap,
     trajectory::Trajectory,
 };
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
@@ -140,4 +141,30 @@ fn through_a_fisheye_with_oblique_view() {
         camera.mount.angles_deg = [5.0, -60.0, 20.0];
     };
     check("fisheye", with(rolling(), change), steady(500.0, 10.0, EAST, TURN));
+}
+
+/// A picture that repeats is the same one period on; held at its border it is not.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_picture_repeats_where_its_mesh_says_so() {
+    let engine = engine();
+    let mut scenario = scenario();
+    scenario.camera.size_px = [120, 90];
+    scenario.camera.focal_px = [100.0, 100.0];
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+    let unlike = |wrap: Wrap| {
+        // Four copies of the picture over 400 m, one each 100 m: a period is 50 px from 200 m above ground. The middle is a seam.
+        let mut scene = pattern(400.0);
+        scene.meshes[0].wrap = wrap;
+        for vertex in &mut scene.meshes[0].vertices {
+            vertex.uv = vertex.uv.map(|t| 4.0 * t);
+        }
+        let sequence = sequence(scenario.clone(), steady(200.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
+        let color = render_at_phase(&engine, &sequence, &[Channel::Color], 0, 0.0).frame.color_rgba;
+        let at = |x: usize, y: usize| color[4 * (y * 120 + x)];
+        (0..90 * 70).map(|i| (at(i % 70, i / 70) - at(i % 70 + 50, i / 70)).abs()).fold(0.0, f32::max)
+    };
+    // Half precision, and the filter's own rounding.
+    assert!(unlike(Wrap::Repeat) < 0.01, "{}", unlike(Wrap::Repeat));
+    assert!(unlike(Wrap::Clamp) > 0.1, "{}", unlike(Wrap::Clamp));
 }

@@ -255,14 +255,14 @@ impl Report {
         text
     }
 
-    /// RMS of the source coordinates against time, both logarithmic: for each kind of case a curve through its methods, each a geometric mean
-    /// over the cases of that kind that have it; the paper's preset stands alone.
+    /// RMS of the source coordinates against time, both logarithmic. A point is a method's geometric mean over the cases of one kind; for each kind
+    /// of case a curve joins the methods that no other beats, and the others and the paper's preset stand alone.
     ///
     /// # Errors
     /// Nothing was measured.
     pub fn plot(&self) -> Result<String, BenchError> {
         let mut series = Vec::new();
-        let mut paper = Vec::new();
+        let (mut beaten, mut paper) = (Vec::new(), Vec::new());
         let mut groups: Vec<&str> = self.rows.iter().map(|row| row.group).collect();
         groups.dedup();
         for group in groups {
@@ -287,11 +287,19 @@ impl Report {
                 }
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            series.push(Series { name: group.to_owned(), points, joined: true });
+            let mut least = f64::INFINITY;
+            let (front, rest): (Vec<_>, Vec<_>) = points.into_iter().partition(|&(_, rms_px)| {
+                let better = rms_px < least;
+                least = least.min(rms_px);
+                better
+            });
+            beaten.extend(rest);
+            series.push(Series { name: group.to_owned(), points: front, joined: true });
         }
+        series.push(Series { name: "beaten by another method".to_owned(), points: beaten, joined: false });
         series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
         let plot = Plot {
-            title: format!("Error against time, {}", self.adapter),
+            title: format!("Error against time, camsim {}, {}", self.version, self.adapter.split(" (").next().unwrap_or_default()),
             x_label: "ms a frame (median)".into(),
             y_label: "RMS of the source coordinates, px".into(),
             log: [true, true],
