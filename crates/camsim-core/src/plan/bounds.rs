@@ -132,8 +132,14 @@ pub(super) fn ideal_geometry(
     let inverse_near = 1.0 / super::nearest_m(scene, &key, tangents, travel_m);
     let mut low = DVec2::splat(f64::INFINITY);
     let mut high = DVec2::splat(f64::NEG_INFINITY);
-    for &(uv, [x, y]) in &reach.rays {
-        let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+    let last_row = reach.camera.size_px[1] - 1;
+    // The grid of the reach steps over rows of one parity: a neighbour stands for the other field.
+    let in_fields = reach.rays.iter().flat_map(|&(uv, [x, y])| {
+        let other = if shutter.interlace_s() > 0.0 { Some((y ^ 1).min(last_row)) } else { None };
+        std::iter::once(y).chain(other).map(move |y| (uv, shutter.dt_pixel_s(x, y)))
+    });
+    for (uv, dt_s) in in_fields {
+        let mid_s = stamp_s + dt_s;
         let mut include = |at: DVec2| {
             low = low.min(at);
             high = high.max(at);

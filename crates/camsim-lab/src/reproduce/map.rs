@@ -18,6 +18,8 @@ use super::{
 
 /// Every time constant, seconds.
 const LONG_S: f64 = 1.0;
+/// Colour of the sky, sRGB: the paper's.
+const SKY: [f64; 3] = [0.65, 0.85, 1.0];
 /// Every so many pixels are compared with the oracle.
 const STEP_PX: u32 = 4;
 
@@ -37,7 +39,7 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             let scenario = Scenario {
                 flight: FlightSpec { log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"), ..own.flight.clone() },
                 tracker: TrackerSpec { max_acceleration_m_s2: 40.0, ..TrackerSpec::default() },
-                scene: SceneSpec { terrain: Some(terrain), ..own.scene.clone() },
+                scene: SceneSpec { terrain: Some(terrain), sky: SKY, ..own.scene.clone() },
                 ..own
             };
             (scenario, "the paper's lawnmower log, moved and scaled over an alpine valley (the paper's own ground is not at hand)")
