@@ -4,7 +4,7 @@ mod common;
 
 use camsim_core::{
     plan::EdgeStage,
-    scenario::{Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     scene::{Scene, Terrain},
     temporal::edges::{FineImage, KeyView, Keys, gather_edges},
     trajectory::Trajectory,
@@ -65,6 +65,7 @@ fn rays_at_silhouettes_agree_with_their_twin() {
     scenario.camera.size_px = [120, 90];
     scenario.camera.focal_px = [96.0, 96.0];
     scenario.camera.shutter = rolling(15.0);
+    scenario.quality.key_frames = Auto::Value(1);
     let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
     let plan = &done.plan;

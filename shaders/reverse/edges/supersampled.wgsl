@@ -13,11 +13,13 @@
 const GOLDEN: f32 = 0.6180339887;
 // Looks along the parallax of a ray: their distance in ideal pixels, and how many at most.
 const LOOK_PX: f32 = 0.5;
-const MAX_LOOKS: u32 = 64u;
-// Fixed-point steps from each look.
-const LOOK_STEPS: u32 = 4u;
-// A depth that gives itself again to within this, in ideal pixels of parallax, is where the ray meets a surface.
-const MEETS_PX: f32 = 0.05;
+const MAX_LOOKS: u32 = 128u;
+// Halvings of the distance in which a ray stops being free.
+const HALVINGS: u32 = 5u;
+// A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
+const GAP_PX: f32 = 0.1;
+// Depths that agree to within this, in the same measure, are of one surface.
+const SAME_PX: f32 = 0.25;
 
 struct FineSample {
     texel: vec2<i32>,
@@ -108,13 +110,21 @@ fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     return Gathered(vec4<f32>(sum / f32(frame.edge_samples), 1.0), plain.inside);
 }
 
+// What the centre of a pixel sees: the pixel's own ray, in the key that sees its end.
+fn centre_seen(pixel: vec2<u32>, ray: Ray, share: f32) -> Seen {
+    let met = first_surface_of_keys(pixel, ray.uv, share);
+    let pose = pose_along(pixel, share);
+    let w = smooth_depth(ray.uv, pose, met.in_line);
+    let in_key = point_at(ray.uv, pose, w);
+    return seen_from(ideal_px_from_point(in_key), w, w / in_key.z);
+}
+
 fn seen_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
     use_key_of_line(pixel);
     if (!near_edge(ray.uv, pose_along(pixel, phase + 0.5))) {
         return smooth_px_at_phase(pixel, ray, phase);
     }
-    let found = first_surface_of_keys(pixel, ray.uv, phase + 0.5);
-    return reference_px(found.at_px, found.in_key);
+    return centre_seen(pixel, ray, phase + 0.5).reference_px;
 }
 
 fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
@@ -122,16 +132,14 @@ fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
     if (!near_edge(ray.uv, pose_mid(pixel))) {
         return smooth_mid(pixel, ray);
     }
-    let found = first_surface_of_keys(pixel, ray.uv, 0.5);
-    return seen_from(found.at_px, found.in_line, found.in_key);
+    return centre_seen(pixel, ray, 0.5);
 }
 
 struct Met {
-    // Ideal pixels of the chosen key.
+    // Where the colour of what the ray meets is, ideal pixels of the chosen key.
     at_px: vec2<f32>,
-    // Inverse planar depth there in the line's and in the key's camera, 1/m.
+    // Inverse planar depth of the meeting point in the line's camera, 1/m.
     in_line: f32,
-    in_key: f32,
     // False: the key did not see what the ray meets, and what it saw beside it stands in.
     seen: bool,
 }
@@ -154,44 +162,78 @@ fn first_surface_of_keys(pixel: vec2<u32>, uv: vec2<f32>, share: f32) -> Met {
     return first;
 }
 
+struct Look {
+    at_px: vec2<f32>,
+    // Inverse depth that the line's camera gives to what the key shows there.
+    found: f32,
+}
+
+fn look_at(uv: vec2<f32>, pose: Pose, w: f32) -> Look {
+    let at_px = ideal_px_from_point(point_at(uv, pose, w));
+    return Look(at_px, line_inverse_depth(uv, pose, fine_inverse_depth(at_px)));
+}
+
 // Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all to infinity, lie on a line of
-// the ideal frame; the ray meets a surface at a depth whose own place there shows that depth. Of several the nearest counts. If there is
-// none, the key camera did not see what the ray meets, and the farthest surface seen beside it stands in.
+// the ideal frame: as long as they are nearer than what the key shows at their places the ray is free. Where it is free no longer and
+// the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still hidden when it
+// gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last stands in.
 fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
     let w_near = nearest_inverse_depth(uv, pose);
     let near_px = ideal_px_from_point(point_at(uv, pose, w_near));
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
     let px_per_w = distance(near_px, far_px) / max(w_near, 1e-12);
-    if (px_per_w * w_near < 0.1 * MEETS_PX) {
-        let in_key = fine_inverse_depth(far_px);
-        return Met(far_px, line_inverse_depth(uv, pose, in_key), in_key, true);
+    if (px_per_w * w_near < 0.1 * GAP_PX) {
+        return Met(far_px, line_inverse_depth(uv, pose, fine_inverse_depth(far_px)), true);
     }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);
-    var met = Met(far_px, -1.0, 0.0, false);
-    var farthest = Met(far_px, 1e30, 0.0, false);
-    for (var i = 0u; i <= looks; i++) {
-        var w = w_near * (1.0 - f32(i) / f32(looks));
-        if (w <= met.in_line) {
+    var free = look_at(uv, pose, w_near);
+    var free_w = w_near;
+    var hidden = false;
+    for (var i = 1u; i <= looks; i++) {
+        let w = w_near * (1.0 - f32(i) / f32(looks));
+        let here = look_at(uv, pose, w);
+        if (w > here.found) {
+            free = here;
+            free_w = w;
+            hidden = false;
+            continue;
+        }
+        if (!hidden) {
+            var behind = here;
+            var behind_w = w;
+            for (var k = 0u; k < HALVINGS; k++) {
+                let between_w = 0.5 * (free_w + behind_w);
+                let between = look_at(uv, pose, between_w);
+                if (between_w > between.found) {
+                    free = between;
+                    free_w = between_w;
+                } else {
+                    behind = between;
+                    behind_w = between_w;
+                }
+            }
+            if ((behind.found - free.found) * px_per_w < GAP_PX) {
+                return Met(free.at_px, free.found, inside_ideal(free.at_px));
+            }
+            hidden = true;
+        }
+        if (w <= free.found) {
             break;
         }
-        for (var k = 0u; k < LOOK_STEPS; k++) {
-            let at_px = ideal_px_from_point(point_at(uv, pose, w));
-            let in_key = fine_inverse_depth(at_px);
-            let found = line_inverse_depth(uv, pose, in_key);
-            if (found < farthest.in_line) {
-                farthest = Met(at_px, found, in_key, false);
-            }
-            if (abs(found - w) * px_per_w < MEETS_PX) {
-                if (found > met.in_line && inside_ideal(at_px)) {
-                    met = Met(at_px, found, in_key, true);
-                }
-                break;
-            }
-            w = found;
-        }
     }
-    if (met.seen) {
+    return Met(free.at_px, free.found, false);
+}
+
+// The surface that is met, from the depths of pixels that show no other: those are planes and not steps.
+fn smooth_depth(uv: vec2<f32>, pose: Pose, met: f32) -> f32 {
+    let met_px = ideal_px_from_point(point_at(uv, pose, met));
+    if (ideal_color_at(met_px).a < 0.9999) {
         return met;
     }
-    return farthest;
+    let px_per_w = distance(met_px, ideal_px_from_point(point_at(uv, pose, 0.0))) / max(met, 1e-12);
+    var w = met;
+    for (var i = 0u; i < 3u; i++) {
+        w = line_inverse_depth(uv, pose, inverse_depth(ideal_px_from_point(point_at(uv, pose, w))).value);
+    }
+    return select(met, w, abs(w - met) * px_per_w < SAME_PX);
 }

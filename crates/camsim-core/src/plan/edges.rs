@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BlurStage, Skip};
+use super::{BlurStage, SIZE_QUANTUM_PX, Skip};
 use crate::{
     pose::CameraPose,
     scenario::QualitySpec,
@@ -20,9 +20,12 @@ const BLOCK_CELLS: u32 = 8;
 const FACING_MARGIN: f64 = 0.95;
 /// From this tolerance (1/255 RMS) on silhouettes are left as one sample a pixel shows them.
 const IGNORED_DN: f64 = 16.0;
-/// From this tolerance (1/255 RMS over the picture) on one ideal pixel a pixel with 4 samples does, else 4 ideal pixels with 16 samples are
-/// drawn. 4 samples leave about 30 dB, or 8/255, at silhouettes; with a hundredth of the pixels at silhouettes that is 0.8/255 over the picture.
+/// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4 samples leave about 30 dB, or 8/255, at silhouettes; with a hundredth of the pixels at silhouettes that is 0.8/255 over the picture.
 const COARSE_DN: f64 = 1.0;
+/// Colour and depth of 4 samples, and their mean colour.
+const FINE_PIXEL_BYTES: u64 = 4 * 12 + 8;
+/// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead of 9.
+const MAX_FINE_BYTES: u64 = 512 << 20;
 /// A flat mesh with more corners than this is not looked at any closer.
 const MAX_FLAT_VERTICES: usize = 64;
 
@@ -136,16 +139,22 @@ pub(super) fn edge_stage(
         skipped.push(Skip { what: "silhouette supersampling", reason: format!("quality.max_error_dn is {IGNORED_DN} or more") });
         return EdgeStage::None;
     }
-    let fits = ideal.size_px.iter().all(|&side| side.next_multiple_of(64) <= max_side_px / 2);
-    let scale = if fits && quality.max_error_dn < COARSE_DN { 2 } else { 1 };
+    let [width, height] = ideal.size_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
+    let fits = |scale: u64| {
+        width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
+    };
+    let scale = match quality.max_error_dn < COARSE_DN {
+        false => 1,
+        true => [3, 2].into_iter().find(|&scale| fits(u64::from(scale))).unwrap_or(1),
+    };
     EdgeStage::Supersampled { scale, samples: samples(scale, blur) }
 }
 
-/// Measured at straight edges (scale 2): 32 rays reach 39 dB without exposure; with it 32, 64 and 256 reach 35, 36 and 40 dB. A long path
+/// Measured at straight edges of full contrast (scale 2): 32 rays reach 39 dB without exposure; with it 32, 64 and 256 reach 35, 36 and 40 dB. A long path
 /// asks for as many as the plain gather takes. A power of two: only then are the rays' places even.
 fn samples(scale: u32, blur: Option<BlurStage>) -> u32 {
     match blur {
-        None => 16 * scale,
+        None => (16 * scale).next_power_of_two(),
         Some(blur) => (blur.max_samples * (blur.nodes - 1)).clamp(32 * scale, 256).next_power_of_two(),
     }
 }

@@ -9,11 +9,11 @@ use super::IdealGeometry;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Distance of two looks along the parallax of a ray, ideal pixels, while they are no more than [`MAX_LOOKS`].
 const LOOK_PX: f64 = 0.5;
-const MAX_LOOKS: f64 = 64.0;
-/// Fixed-point steps from each look.
-const LOOK_STEPS: u32 = 4;
-/// A depth that gives itself again to within this, ideal pixels of parallax, is where the ray meets a surface.
-const MEETS_PX: f64 = 0.05;
+const MAX_LOOKS: f64 = 128.0;
+/// Halvings of the distance in which a ray stops being free.
+const HALVINGS: u32 = 5;
+/// A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
+const GAP_PX: f64 = 0.1;
 /// A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
 const EDGE_STEP: f64 = 0.01;
 
@@ -97,9 +97,9 @@ pub struct Keys<'a> {
 /// Where a ray meets a surface of an ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Met {
-    /// Ideal pixels.
+    /// Where its colour is, ideal pixels.
     pub at_px: DVec2,
-    /// Inverse planar depth there in the line's camera, 1/m.
+    /// Inverse planar depth of the meeting point in the line's camera, 1/m.
     pub in_line: f64,
     /// False: the key camera did not see what the ray meets, and what it saw beside it stands in.
     pub seen: bool,
@@ -143,46 +143,61 @@ pub fn first_surface_of_keys(uv: DVec2, share: f64, keys: &Keys<'_>, ideal: &Ide
     first
 }
 
-/// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all (`nearest_w` in the key
-/// camera, 1/m) to infinity, lie on a line of the ideal frame; the ray meets a surface at a depth whose own place there shows that depth.
-/// Of several the nearest counts. If there is none, the farthest surface seen on the way stands in.
+/// Where a ray first meets a surface of the ideal frame. Its points, from the nearest surface of all (`nearest_w` in the key camera, 1/m)
+/// to infinity, lie on a line of the ideal frame: as long as they are nearer than what the key shows at their places the ray is free.
+/// Where it is free no longer and the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if
+/// it is still hidden when it gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last
+/// stands in.
 #[must_use]
 pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, image: &FineImage<'_>, ideal: &IdealGeometry) -> Met {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
-    let place = |w: f64| ideal.px_from_point(direction + w * shift);
     let in_line = |in_key: f64| in_key * direction.z / (1.0 - shift.z * in_key).max(1e-3);
+    let place = |w: f64| ideal.px_from_point(direction + w * shift);
+    // Place, and the inverse depth that the line's camera gives to what the key shows there.
+    let look_at = |w: f64| {
+        let at_px = place(w);
+        (at_px, in_line(image.at(at_px).inverse_depth))
+    };
+    // A camera that all but reaches the nearest surface would stretch the search without end.
     let w_near = in_line(1.02 * nearest_w).min(4.0 * 1.02 * nearest_w);
-    let far_px = place(0.0);
+    let (far_px, at_infinity) = look_at(0.0);
     let length_px = place(w_near).distance(far_px);
     let px_per_w = length_px / w_near.max(1e-12);
-    if length_px < 0.1 * MEETS_PX {
-        return Met { at_px: far_px, in_line: in_line(image.at(far_px).inverse_depth), seen: true };
+    if length_px < 0.1 * GAP_PX {
+        return Met { at_px: far_px, in_line: at_infinity, seen: true };
     }
     let looks = (length_px / LOOK_PX).ceil().clamp(1.0, MAX_LOOKS) as u32;
-    let mut met: Option<Met> = None;
-    let mut farthest = Met { at_px: far_px, in_line: f64::INFINITY, seen: false };
-    for i in 0..=looks {
-        let mut w = w_near * (1.0 - f64::from(i) / f64::from(looks));
-        if met.is_some_and(|met| w <= met.in_line) {
+    let (mut free, mut free_w) = (look_at(w_near), w_near);
+    let mut hidden = false;
+    for i in 1..=looks {
+        let w = w_near * (1.0 - f64::from(i) / f64::from(looks));
+        let here = look_at(w);
+        if w > here.1 {
+            (free, free_w, hidden) = (here, w, false);
+            continue;
+        }
+        if !hidden {
+            let (mut behind, mut behind_w) = (here, w);
+            for _ in 0..HALVINGS {
+                let between_w = 0.5 * (free_w + behind_w);
+                let between = look_at(between_w);
+                if between_w > between.1 {
+                    (free, free_w) = (between, between_w);
+                } else {
+                    (behind, behind_w) = (between, between_w);
+                }
+            }
+            if (behind.1 - free.1) * px_per_w < GAP_PX {
+                return Met { at_px: free.0, in_line: free.1, seen: ideal.contains(free.0) };
+            }
+            hidden = true;
+        }
+        if w <= free.1 {
             break;
         }
-        for _ in 0..LOOK_STEPS {
-            let at_px = place(w);
-            let found = in_line(image.at(at_px).inverse_depth);
-            if found < farthest.in_line {
-                farthest = Met { at_px, in_line: found, seen: false };
-            }
-            if (found - w).abs() * px_per_w < MEETS_PX {
-                if met.is_none_or(|met| found > met.in_line) && ideal.contains(at_px) {
-                    met = Some(Met { at_px, in_line: found, seen: true });
-                }
-                break;
-            }
-            w = found;
-        }
     }
-    met.unwrap_or(farthest)
+    Met { at_px: free.0, in_line: free.1, seen: false }
 }
 
 /// Mean colour of `count` rays over the area of a pixel (centre `uv`, `d_uv` = its change along x and y) and over the exposure.
@@ -201,6 +216,8 @@ pub fn gather_edges(uv: DVec2, d_uv: [DVec2; 2], keys: &Keys<'_>, count: u32, id
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     const IDEAL: IdealGeometry = IdealGeometry { size_px: [80, 20], focal_px: DVec2::splat(60.0), principal_px: DVec2::new(39.5, 9.5) };
@@ -234,13 +251,18 @@ mod tests {
                 if border_px.abs() < 0.3 {
                     continue;
                 }
-                let at_px = first_surface(DVec2::new(u, 0.01), pose, ROOF, &image, &IDEAL).at_px;
+                let met = first_surface(DVec2::new(u, 0.01), pose, ROOF, &image, &IDEAL);
+                let at_px = met.at_px;
                 let seen = image.at(at_px);
                 let roof = border_px < 0.0;
                 assert_eq!(seen.inverse_depth, if roof { ROOF } else { GROUND }, "shift {shift_m}, u {u}: {at_px}");
                 let exact_px = (u + shift_m * seen.inverse_depth) * IDEAL.focal_px.x + IDEAL.principal_px.x;
-                let hidden = !roof && exact_px < IDEAL.principal_px.x + 0.3;
-                assert!(hidden || (at_px.x - exact_px).abs() <= MEETS_PX, "shift {shift_m}, u {u}: {at_px} {exact_px}");
+                // Under the roof, and deep enough under it to tell: said to be so.
+                let under_px = IDEAL.principal_px.x - exact_px;
+                let hidden = !roof && under_px > -0.3;
+                assert!(hidden || (at_px.x - exact_px).abs() <= LOOK_PX / 32.0 + 1e-9, "shift {shift_m}, u {u}: {at_px} {exact_px}");
+                assert!(met.seen != (hidden && under_px > 0.3) || under_px.abs() <= 0.3, "shift {shift_m}, u {u}: {met:?} {under_px}");
+                assert_eq!(met.in_line, seen.inverse_depth);
             }
         }
     }
@@ -267,6 +289,59 @@ mod tests {
         let moving = [-1.0, 1.0].map(|px| (DMat3::IDENTITY, DVec3::new(px * pixel / ROOF, 0.0, 0.0)));
         let found = of(&moving, DVec2::ZERO);
         assert!((found.x - 0.5).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn a_second_key_shows_what_the_first_hides() {
+        // As `image`, but the ground's colour is its place: the key at x = 1.5 m sees 3 px more of it beside the roof.
+        let ground_m = |at_px: DVec2, key_m: f64| (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x / GROUND + key_m;
+        let seen_from = |key_m: f64| -> Vec<FineSample> {
+            let [width, height] = IDEAL.size_px.map(|side| side * 2);
+            let corners = (0..width * height).map(|i| DVec2::new(f64::from(i % width), f64::from(i / width)));
+            corners
+                .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / 2.0 - 0.5))
+                .map(|at_px| {
+                    let roof = (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x < -key_m * ROOF;
+                    let w = if roof { ROOF } else { GROUND };
+                    FineSample { inverse_depth: w, color: if roof { DVec3::splat(-100.0) } else { DVec3::splat(ground_m(at_px, key_m)) } }
+                })
+                .collect()
+        };
+        let keys_m = [-1.5, 1.5];
+        let images = keys_m.map(seen_from);
+        // The line's camera stands at x = 1.2 m, nearer in time to the first key.
+        let nodes = keys_m.map(|key_m| [(DMat3::IDENTITY, DVec3::new(1.2 - key_m, 0.0, 0.0))]);
+        let views =
+            [0, 1].map(|k| KeyView { nodes: &nodes[k], image: FineImage { size_px: IDEAL.size_px, scale: 2, samples: &images[k] } });
+        let mut filled = 0;
+        for k in -60..200 {
+            let u = f64::from(k) * 2e-3;
+            let (border_u, ground_m) = (-1.2 * ROOF, 1.2 + u / GROUND);
+            if (u - border_u).abs() * IDEAL.focal_px.x < 0.3 {
+                continue;
+            }
+            let expected = if u < border_u { -100.0 } else { ground_m };
+            let color = |views: &[KeyView<'_>]| {
+                let keys = Keys { views, line_share: 0.1, exposure_share: 0.0, nearest_w: ROOF };
+                let (key, met) = first_surface_of_keys(DVec2::new(u, 0.0), 0.5, &keys, &IDEAL).unwrap();
+                (views[key].image.at(met.at_px).color.x - expected).abs()
+            };
+            let (one, two) = (color(&views[..1]), color(&views));
+            // A sample stands for a quarter of a pixel.
+            assert!(two <= 0.5 / IDEAL.focal_px.x / GROUND, "{u}: {two}");
+            filled += u32::from(one > 1.0);
+        }
+        assert!(filled > 20, "one key must not suffice: {filled}");
+    }
+
+    #[test]
+    fn keys_come_in_the_order_of_their_distance() {
+        let order = |share: f64, count: usize| (0..count).map(|rank| key_of_rank(share, count, rank)).collect::<Vec<_>>();
+        assert_eq!(order(0.1, 2), [0, 1]);
+        assert_eq!(order(0.9, 2), [1, 0]);
+        assert_eq!(order(0.5, 2), [0, 1]);
+        assert_eq!(order(0.3, 4), [1, 0, 2, 3]);
+        assert_eq!(order(-3.0, 3), [0, 1, 2]);
     }
 
     #[test]
