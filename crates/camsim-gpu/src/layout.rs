@@ -40,7 +40,8 @@ pub struct FrameUniforms {
     pub ned_from_key_z: [f32; 4],
     pub key_velocity_m_s: [f32; 4],
     pub key_rate_rad_s: [f32; 4],
-    pub lens_radial: [f32; 4],
+    pub lens_radial: [f32; 3],
+    pub pad0: u32,
     pub linear_fog: [f32; 4],
 }
 
@@ -153,6 +154,7 @@ mod tests {
                 key_velocity_m_s,
                 key_rate_rad_s,
                 lens_radial,
+                pad0,
                 linear_fog,
             ]
         );
