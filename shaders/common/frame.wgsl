@@ -54,7 +54,8 @@ struct Frame {
     key_velocity_m_s: vec4<f32>,
     key_rate_rad_s: vec4<f32>,
     // k1 k2 k3 of the lens.
-    lens_radial: vec4<f32>,
+    lens_radial: vec3<f32>,
+    pad0: u32,
     // Fog after the gather: its colour as stored, and 1 / the distance from which on there is nothing else (0 = clear).
     linear_fog: vec4<f32>,
     // Several ideal frames: their number, rows from one to the next in their textures, and the exposure as a share of the window.

@@ -370,7 +370,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
         exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
-        lens_radial: [lens(0), lens(1), lens(4), 0.0],
+        lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
         linear_fog,
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
