@@ -47,6 +47,10 @@ const MAX_SAMPLES: u32 = 1024;
 const MAX_TAPS: u32 = 8;
 /// Parallax between the surfaces around a source, over the exposure, beyond which every sample is solved on its own, pixels.
 const EDGE_PARALLAX_PX: f64 = 0.1;
+/// A difference of inverse depth, relative to the nearer, that is a jump and no slope: as where depth is read.
+const JUMP: f64 = 0.1;
+/// Miss of the polyline at the exposure's middle beyond which every sample is solved on its own, pixels.
+const BENT_PX: f64 = 0.05;
 
 /// Why the pipeline cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -290,7 +294,7 @@ impl<'a> Pipeline<'a> {
             Some(samples) => (f64::from(samples), samples.div_ceil(self.nodes - 1)),
             None => (SAMPLES_PER_PX, MAX_SAMPLES),
         };
-        if !self.meets_edge(dt_s, &sources) {
+        if !self.meets_edge(dt_s, &sources, middle.at_px) {
             return Some(gather(&nodes_px, &area, &self.color(), per_px, cap));
         }
         // Surfaces that part over the exposure: every sample finds its own.
@@ -306,18 +310,24 @@ impl<'a> Pipeline<'a> {
         sum.map(|sum| sum / f64::from(count))
     }
 
-    /// Whether inverse depths near the sources differ so much that the exposure's travel would pull their surfaces apart.
-    fn meets_edge(&self, dt_s: f64, sources: &[Source]) -> bool {
+    /// Whether surfaces meet near the sources, and the exposure's travel pulls them apart; or the polyline misses the path at its middle.
+    fn meets_edge(&self, dt_s: f64, sources: &[Source], middle_px: DVec2) -> bool {
+        let half = sources.len() / 2;
+        let chord_px = sources[(sources.len() - 1) / 2].at_px.midpoint(sources[half].at_px);
+        if chord_px.distance(middle_px) > BENT_PX {
+            return true;
+        }
         let half_s = 0.5 * self.shutter.exposure_s();
         let (_, begin) = self.motion.key_from(dt_s - half_s, self.frame.instant_s);
         let (_, end) = self.motion.key_from(dt_s + half_s, self.frame.instant_s);
         let travel_px_m = self.frame.geometry.focal_px.max_element() * begin.distance(end);
         let depth = self.depth();
-        let spread = |source: &Source| depth.spread(source.at_px);
-        let (low, high) =
-            sources.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s.inverse_depth), high.max(s.inverse_depth)));
-        let along = sources.iter().map(spread).fold(high - low, f64::max);
-        along * travel_px_m > EDGE_PARALLAX_PX
+        let apart = |difference: f64, nearer: f64| difference > JUMP * nearer && difference * travel_px_m > EDGE_PARALLAX_PX;
+        let between = |pair: &[Source]| {
+            let [a, b] = [pair[0].inverse_depth, pair[1].inverse_depth];
+            apart((a - b).abs(), a.max(b))
+        };
+        sources.windows(2).any(between) || sources.iter().any(|source| apart(depth.spread(source.at_px), source.inverse_depth))
     }
 
     /// Change of the source per output pixel: through the lens's inverse Jacobian and the relative pose at the ray's own depth.

@@ -301,9 +301,13 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
             let theirs = [r, g, b].map(f64::from);
             let (red, black) = (theirs == [255.0, 0.0, 0.0], theirs == [0.0; 3]);
             let Some(ours) = levels_of(&rendered, (y * width + x) as usize) else {
-                // No source in the ideal frame: alpha 0 here, black or the red of "no convergence" there.
-                empty += u32::from(red || black);
-                missed += u32::from(!red && !black);
+                // No source in the ideal frame: alpha 0 here; there black, black under fog, or the red of "no convergence".
+                let fogged = golden.paper.fog.is_some() && {
+                    let share = theirs[2] / FOG[2];
+                    share > 0.0 && difference(theirs, FOG.map(|v| share * v)) <= AGREES
+                };
+                empty += u32::from(red || black || fogged);
+                missed += u32::from(!red && !black && !fogged);
                 continue;
             };
             let off = difference(ours, theirs);
@@ -321,7 +325,7 @@ fn papers_methods_give_the_reference_programs_pixels_or_a_named_fault() {
                 continue;
             }
             // The fewest faults that give that program's value; each must change it.
-            let subsets = (1..16_u32)
+            let subsets = (1..1_u32 << FAULTS.len())
                 .map(|bits| FAULTS.into_iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, f)| f).collect::<Vec<_>>());
             let mut subsets: Vec<Vec<Fault>> = subsets.collect();
             subsets.sort_by_key(Vec::len);
@@ -423,7 +427,7 @@ fn own_methods_beside_the_reference_programs() {
             "| {} | {p50:.1e} | {p99:.1e} | {worst:.1e} | {rms:.2} | {over:.2} % | {stored_rms:.2} | {stored_over:.2} % |",
             golden.name
         );
-        // The law of the paper's step, e = r theta step^2 / 6, is 0.1 px for 18 deg at 560 px; steps of depth are beyond it.
+        // The law of its step, e = r theta step^2 / 6, gives 0.06 px for 18 deg at 560 px; at steps of depth it is worse.
         assert!(p50 < 0.1, "{}: {p50}", golden.name);
     }
 }

@@ -15,7 +15,7 @@ const MEETS_PX: f64 = 0.05;
 /// Parallax between the surfaces along a path below which they need not be told apart, ideal pixels.
 const ONE_SURFACE_PX: f64 = 0.02;
 /// Movement of the source at which the fixed point has been reached, ideal pixels.
-const SETTLED_PX: f64 = 1e-9;
+const SETTLED_PX: f64 = 1e-8;
 const MAX_STEPS: u32 = 32;
 
 /// What a tile of the depth image holds.
