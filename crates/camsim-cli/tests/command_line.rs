@@ -175,7 +175,8 @@ fn the_predicted_error_is_explained_by_cause() {
     };
     let out = explain(&[]);
     assert!(out.contains("predicted error") && out.contains("within the tolerance") && out.contains("single precision"), "{out}");
-    let of = |more: &[&str]| serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"][..], more].concat())).unwrap()["plan"].clone();
+    let of =
+        |more: &[&str]| serde_json::from_str::<serde_json::Value>(&explain(&[&["--json"][..], more].concat())).unwrap()["plan"].clone();
     let plan = of(&[]);
     let predicted = &plan["predicted"];
     let total_px = predicted["total_px"].as_f64().unwrap();
