@@ -215,7 +215,7 @@ fn the_predicted_error_is_explained_by_cause() {
     assert!(linear["predicted"]["temporal_px"].as_f64().unwrap() > predicted["temporal_px"].as_f64().unwrap(), "{linear}");
     let floor = of(&["--set", "quality.max_error_px=1e-7"]);
     assert!(
-        floor["predicted"]["kept"] == false && floor["predicted"]["in_the_way"].as_str().unwrap().contains("single precision"),
+        floor["predicted"]["kept"] == false && floor["predicted"]["in_the_way"].as_str().unwrap().contains("the lens inverse"),
         "{floor}"
     );
 }
