@@ -147,9 +147,10 @@ mod tests {
         let found = spots(&frame);
         assert_eq!(found.len(), 2, "the one at the border does not count: {found:?}");
         for (spot, (centre, radius)) in found.iter().zip(discs) {
-            assert!(
-                spot.centroid_px.distance(centre) < 2e-3 && (spot.area_px2 / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 2e-3
-            );
+            // The picture knows a rim pixel's share of the disc to a few of its 256 places, and there are some 40 of these.
+            let area_px2 = std::f64::consts::PI * radius * radius;
+            let (shift, growth) = (spot.centroid_px.distance(centre), spot.area_px2 / area_px2 - 1.0);
+            assert!(shift < 5e-3 && growth.abs() < 5e-3, "{spot:?}: {shift} {growth}");
         }
         // A pixel without a ray in the rim spoils a spot.
         frame.color_rgba[4 * (15 * 64 + 27) + 3] = 0.0;
