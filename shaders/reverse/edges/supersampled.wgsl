@@ -193,6 +193,16 @@ fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
         let w = w_near * (1.0 - f32(i) / f32(looks));
         let here = look_at(uv, pose, w);
         if (w > here.found) {
+            // Free again on the other side of what was seen last: between the two looks the ray may have met it.
+            if (w <= free.found) {
+                if (hidden) {
+                    break;
+                }
+                let there = look_at(uv, pose, free.found);
+                if (abs(free.found - there.found) * px_per_w < GAP_PX) {
+                    return Met(there.at_px, there.found, inside_ideal(there.at_px));
+                }
+            }
             free = here;
             free_w = w;
             hidden = false;

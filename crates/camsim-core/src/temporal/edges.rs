@@ -174,6 +174,16 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
         let w = w_near * (1.0 - f64::from(i) / f64::from(looks));
         let here = look_at(w);
         if w > here.1 {
+            // Free again on the other side of what was seen last: between the two looks the ray may have met it.
+            if w <= free.1 {
+                if hidden {
+                    break;
+                }
+                let there = look_at(free.1);
+                if (free.1 - there.1).abs() * px_per_w < GAP_PX {
+                    return Met { at_px: there.0, in_line: there.1, seen: ideal.contains(there.0) };
+                }
+            }
             (free, free_w, hidden) = (here, w, false);
             continue;
         }
