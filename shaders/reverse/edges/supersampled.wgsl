@@ -173,6 +173,13 @@ fn look_at(uv: vec2<f32>, pose: Pose, w: f32) -> Look {
     return Look(at_px, line_inverse_depth(uv, pose, fine_inverse_depth(at_px)));
 }
 
+// A ray that is free at two looks, the second deeper than what the first saw, may have met that in between: it has if the surface goes on
+// to where the ray is as deep.
+fn met_before(uv: vec2<f32>, pose: Pose, free: Look, px_per_w: f32) -> Met {
+    let there = look_at(uv, pose, free.found);
+    return Met(there.at_px, there.found, abs(free.found - there.found) * px_per_w < GAP_PX && inside_ideal(there.at_px));
+}
+
 // Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all to infinity, lie on a line of
 // the ideal frame: as long as they are nearer than what the key shows at their places the ray is free. Where it is free no longer and
 // the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still hidden when it
@@ -193,6 +200,15 @@ fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
         let w = w_near * (1.0 - f32(i) / f32(looks));
         let here = look_at(uv, pose, w);
         if (w > here.found) {
+            if (w <= free.found) {
+                if (hidden) {
+                    break;
+                }
+                let met = met_before(uv, pose, free, px_per_w);
+                if (met.seen) {
+                    return met;
+                }
+            }
             free = here;
             free_w = w;
             hidden = false;
@@ -205,6 +221,12 @@ fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
                 let between_w = 0.5 * (free_w + behind_w);
                 let between = look_at(uv, pose, between_w);
                 if (between_w > between.found) {
+                    if (between_w <= free.found) {
+                        let met = met_before(uv, pose, free, px_per_w);
+                        if (met.seen) {
+                            return met;
+                        }
+                    }
                     free = between;
                     free_w = between_w;
                 } else {

@@ -167,6 +167,13 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
     if length_px < 0.1 * GAP_PX {
         return Met { at_px: far_px, in_line: at_infinity, seen: true };
     }
+    // A ray that is free at two looks, the second deeper than what the first saw, may have met that in between: it has if the surface goes
+    // on to where the ray is as deep.
+    let met_before = |free: (DVec2, f64)| {
+        let (at_px, found) = look_at(free.1);
+        let goes_on = (free.1 - found).abs() * px_per_w < GAP_PX && ideal.contains(at_px);
+        goes_on.then_some(Met { at_px, in_line: found, seen: true })
+    };
     let looks = (length_px / LOOK_PX).ceil().clamp(1.0, MAX_LOOKS) as u32;
     let (mut free, mut free_w) = (look_at(w_near), w_near);
     let mut hidden = false;
@@ -174,6 +181,14 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
         let w = w_near * (1.0 - f64::from(i) / f64::from(looks));
         let here = look_at(w);
         if w > here.1 {
+            if w <= free.1 {
+                if hidden {
+                    break;
+                }
+                if let Some(met) = met_before(free) {
+                    return met;
+                }
+            }
             (free, free_w, hidden) = (here, w, false);
             continue;
         }
@@ -183,6 +198,11 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
                 let between_w = 0.5 * (free_w + behind_w);
                 let between = look_at(between_w);
                 if between_w > between.1 {
+                    if between_w <= free.1
+                        && let Some(met) = met_before(free)
+                    {
+                        return met;
+                    }
                     (free, free_w) = (between, between_w);
                 } else {
                     (behind, behind_w) = (between, between_w);
