@@ -145,7 +145,8 @@ impl Eye {
             if size < 1e-9 {
                 return Some(at);
             }
-            if !(size < 0.5 * before) {
+            // Also where the formula gives no number.
+            if size.is_nan() || size >= 0.5 * before {
                 return None;
             }
             before = size;
@@ -241,13 +242,14 @@ impl Eye {
         for look in 1..=LOOKS {
             let angle = look as f64 * step;
             let here = margin(angle);
-            if !(here > 0.0) {
+            if here.is_nan() || here <= 0.0 {
                 return ends_between(angle - step, angle);
             }
             if last < here && last <= before {
                 // A dip: its floor may be below zero between two looks.
                 let floor = lowest((angle - 2.0 * step).max(0.0), angle, margin);
-                if !(margin(floor) > 0.0) {
+                let at_floor = margin(floor);
+                if at_floor.is_nan() || at_floor <= 0.0 {
                     return ends_between((angle - 2.0 * step).max(0.0), floor);
                 }
             }

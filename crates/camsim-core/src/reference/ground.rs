@@ -72,11 +72,12 @@ impl Ground {
             let below = waiting;
             let size = self.levels[level as usize - 1].size;
             for child in [[2 * x, 2 * y], [2 * x + 1, 2 * y], [2 * x, 2 * y + 1], [2 * x + 1, 2 * y + 1]] {
-                if child[0] < size[0] && child[1] < size[1] {
-                    if let Some(enter) = self.enter(level - 1, child, ray, limit) {
-                        stack[waiting] = (enter, level - 1, child);
-                        waiting += 1;
-                    }
+                if child[0] < size[0]
+                    && child[1] < size[1]
+                    && let Some(enter) = self.enter(level - 1, child, ray, limit)
+                {
+                    stack[waiting] = (enter, level - 1, child);
+                    waiting += 1;
                 }
             }
             // The nearest comes off first.

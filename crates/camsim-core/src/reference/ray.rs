@@ -104,7 +104,7 @@ impl Bounds {
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        !(self.low.x <= self.high.x)
+        self.low.x > self.high.x
     }
 
     pub(super) fn grown(&self) -> Self {
