@@ -5,11 +5,10 @@
 @group(0) @binding(0) var fine_depth: texture_depth_multisampled_2d;
 // Fine pixels, their 4 samples averaged by the hardware.
 @group(0) @binding(1) var fine_color: texture_2d<f32>;
-@group(0) @binding(2) var fine_sampler: sampler;
-@group(0) @binding(3) var color: texture_storage_2d<rgba16float, write>;
-@group(0) @binding(4) var depth: texture_storage_2d<r32float, write>;
+@group(0) @binding(2) var color: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(3) var depth: texture_storage_2d<r32float, write>;
 // Bits of the largest depth value of the frame: positive floats are ordered as their bits are.
-@group(0) @binding(5) var<storage, read_write> nearest: atomic<u32>;
+@group(0) @binding(4) var<storage, read_write> nearest: atomic<u32>;
 
 // A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
 const EDGE_STEP: f32 = 0.01;
@@ -48,6 +47,16 @@ fn pixel_spread(pixel: vec2<i32>, scale: i32, at_least: f32) -> Spread {
     return found;
 }
 
+fn pixel_color(pixel: vec2<i32>, scale: i32) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    for (var y = 0; y < scale; y++) {
+        for (var x = 0; x < scale; x++) {
+            sum += textureLoad(fine_color, pixel * scale + vec2<i32>(x, y), 0).rgb;
+        }
+    }
+    return sum / f32(scale * scale);
+}
+
 // Along one direction: a second difference beyond what a smooth surface has, or sky beside a surface.
 fn steps(before: f32, here: f32, after: f32) -> bool {
     let high = max(before, max(here, after));
@@ -83,9 +92,7 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
         if (edge && spread.low < (1.0 - ONE_SURFACE) * spread.high) {
             surface = pixel_spread(pixel, scale, 0.5 * (spread.low + spread.high)).mean;
         }
-        let middle = (vec2<f32>(pixel) + 0.5) / vec2<f32>(size);
-        let mean = textureSampleLevel(fine_color, fine_sampler, middle, 0.0).rgb;
-        textureStore(color, pixel, vec4<f32>(mean, select(1.0, 0.0, edge)));
+        textureStore(color, pixel, vec4<f32>(pixel_color(pixel, scale), select(1.0, 0.0, edge)));
         textureStore(depth, pixel, vec4<f32>(surface));
         atomicMax(&group_nearest, bitcast<u32>(spread.high));
     }

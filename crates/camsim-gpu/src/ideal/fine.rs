@@ -87,7 +87,6 @@ impl FineTarget {
 pub(super) struct ResolvePass {
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::ComputePipeline,
-    sampler: wgpu::Sampler,
 }
 
 impl ResolvePass {
@@ -102,11 +101,10 @@ impl ResolvePass {
             label: Some("camsim.ideal.resolve"),
             entries: &[
                 entry(0, read(wgpu::TextureSampleType::Depth, true)),
-                entry(1, read(wgpu::TextureSampleType::Float { filterable: true }, false)),
-                entry(2, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-                entry(3, write(COLOR_FORMAT)),
-                entry(4, write(wgpu::TextureFormat::R32Float)),
-                entry(5, wgpu::BindingType::Buffer { ty: nearest, has_dynamic_offset: false, min_binding_size: None }),
+                entry(1, read(wgpu::TextureSampleType::Float { filterable: false }, false)),
+                entry(2, write(COLOR_FORMAT)),
+                entry(3, write(wgpu::TextureFormat::R32Float)),
+                entry(4, wgpu::BindingType::Buffer { ty: nearest, has_dynamic_offset: false, min_binding_size: None }),
             ],
         });
         let module = shaders::module(device, "camsim.ideal.resolve", "ideal/resolve.wgsl", &[])?;
@@ -123,13 +121,7 @@ impl ResolvePass {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("camsim.ideal.resolve"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        Ok(Self { layout, pipeline, sampler })
+        Ok(Self { layout, pipeline })
     }
 
     /// Records the resolve of `size_px` ideal pixels.
@@ -150,10 +142,9 @@ impl ResolvePass {
             entries: &[
                 entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
                 entry(1, wgpu::BindingResource::TextureView(&averaged)),
-                entry(2, wgpu::BindingResource::Sampler(&self.sampler)),
-                entry(3, wgpu::BindingResource::TextureView(&color)),
-                entry(4, wgpu::BindingResource::TextureView(&depth)),
-                entry(5, fine.nearest.as_entire_binding()),
+                entry(2, wgpu::BindingResource::TextureView(&color)),
+                entry(3, wgpu::BindingResource::TextureView(&depth)),
+                entry(4, fine.nearest.as_entire_binding()),
             ],
         });
         encoder.clear_buffer(&fine.nearest, 0, None);
