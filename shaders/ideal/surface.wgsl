@@ -44,9 +44,42 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 @group(1) @binding(0) var surface_texture: texture_2d<f32>;
 @group(1) @binding(1) var surface_sampler: sampler;
 
+// Most taps along the longer axis of a pixel's footprint.
+const MAX_TAPS: f32 = 16.0;
+
+// Mean of the picture over a pixel: the ellipse that stands for the pixel on the picture is covered along its longer axis by as many
+// trilinear taps as its shorter axis fits in. Own code, because adapters' anisotropic filters are each their own approximation.
+fn picture_at(uv: vec2<f32>) -> vec3<f32> {
+    let size = vec2<f32>(textureDimensions(surface_texture));
+    let dx = dpdx(uv) * size;
+    let dy = dpdy(uv) * size;
+    // The ellipse's half axes are the singular values of [dx dy]: eigenvalues of the symmetric [[a, b], [b, c]].
+    let a = dx.x * dx.x + dy.x * dy.x;
+    let b = dx.x * dx.y + dy.x * dy.y;
+    let c = dx.y * dx.y + dy.y * dy.y;
+    let mean = 0.5 * (a + c);
+    let spread = sqrt(0.25 * (a - c) * (a - c) + b * b);
+    let longer = sqrt(mean + spread);
+    // A magnified direction needs no more than one tap of the picture itself.
+    let shorter = max(sqrt(max(mean - spread, 0.0)), 1.0);
+    let taps = clamp(ceil(longer / shorter - 0.1), 1.0, MAX_TAPS);
+    let level = log2(max(longer / taps, shorter));
+    // Of the two expressions of the eigenvector, the one without cancellation.
+    let along_x = vec2<f32>(0.5 * (a - c) + spread, b);
+    let along_y = vec2<f32>(b, 0.5 * (c - a) + spread);
+    let along = select(along_y, along_x, a >= c);
+    let axis = along * (longer / max(length(along), 1e-30)) / size;
+    var sum = vec3<f32>(0.0);
+    for (var i = 0.0; i < taps; i += 1.0) {
+        let share = (i + 0.5) / taps - 0.5;
+        sum += textureSampleLevel(surface_texture, surface_sampler, uv + share * axis, level).rgb;
+    }
+    return sum / taps;
+}
+
 @fragment
 fn fragment(in: Surface) -> @location(0) vec4<f32> {
-    var color = textureSample(surface_texture, surface_sampler, in.uv).rgb;
+    var color = picture_at(in.uv);
     if (ideal_camera.sky.w > 0.0) {
         let fog = 1.0 - exp(-ideal_camera.sky.w * length(in.in_camera_m));
         color = mix(color, ideal_camera.sky.rgb, fog);

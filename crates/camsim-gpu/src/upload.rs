@@ -1,7 +1,5 @@
 //! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
 
-use std::borrow::Cow;
-
 use camsim_core::scene::{CHUNK_CELLS, Encoding, LEVELS, Mesh, Scene, Terrain, Texture, Wrap};
 use glam::DVec3;
 use wgpu::util::DeviceExt;
@@ -15,7 +13,7 @@ pub struct SceneBuffers {
     pub terrain: Option<TerrainBuffers>,
     /// Meshes in scene order.
     pub meshes: Vec<MeshBuffers>,
-    /// Trilinear, anisotropic where the adapter can, edges held.
+    /// Trilinear, edges held; the shader takes several taps where the footprint is long.
     pub sampler: wgpu::Sampler,
 }
 
@@ -76,19 +74,13 @@ fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
         mag_filter: wgpu::FilterMode::Linear,
         min_filter: wgpu::FilterMode::Linear,
         mipmap_filter: wgpu::MipmapFilterMode::Linear,
-        anisotropy_clamp: 16,
         ..Default::default()
     })
 }
 
-/// Sides of a texture are multiples of this (or of the power of two above them, if that is less): its first six smaller versions then have
-/// exactly half the side of the one before.
-const TEXTURE_ALIGNMENT_PX: u32 = 64;
-
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
-    let (texture, [su, sv]) = upload_texture(gpu, &terrain.texture, Wrap::Clamp, "scene.terrain.ortho")?;
-    let floats: Vec<f32> =
-        terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], su * v.uv[0], sv * v.uv[1]]).collect();
+    let texture = upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?;
+    let floats: Vec<f32> = terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], v.uv[0], v.uv[1]]).collect();
     gpu.check_storage("the terrain's vertices", 4 * floats.len() as u64, "use a smaller or coarser DEM in scene.terrain.dem")?;
     let mut indices = Vec::new();
     let levels = std::array::from_fn(|level| {
@@ -131,8 +123,8 @@ fn push_level(indices: &mut Vec<u32>, s: u32) {
 }
 
 fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {
-    let (texture, [su, sv]) = upload_texture(gpu, &mesh.texture, mesh.wrap, "the picture of a mesh or pattern")?;
-    let floats: Vec<f32> = mesh.vertices.iter().flat_map(|v| v.position_m.into_iter().chain([su * v.uv[0], sv * v.uv[1]])).collect();
+    let texture = upload_texture(gpu, &mesh.texture, "the picture of a mesh or pattern")?;
+    let floats: Vec<f32> = mesh.vertices.iter().flat_map(|v| v.position_m.into_iter().chain(v.uv)).collect();
     let buffer = |label, contents: &[u8], usage| {
         gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
@@ -146,35 +138,7 @@ fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {
     })
 }
 
-/// The picture with its right and lower border repeated until both sides are aligned, and the share of the sides that is the picture.
-///
-/// Mesa's software adapter (22.3.6), when it filters anisotropically, takes a smaller version's side for the full side over a power of two,
-/// not rounded down: a picture 1830 px wide then appears 0.1 % too small at a quarter of its size, a third of a pixel over 310 px.
-fn aligned(texture: &Texture, wrap: Wrap, max_side_px: u32) -> (Cow<'_, Texture>, [f32; 2]) {
-    let [width, height] = texture.size_px;
-    let size_px = texture.size_px.map(|side| {
-        let whole = side.next_multiple_of(side.next_power_of_two().min(TEXTURE_ALIGNMENT_PX));
-        if whole <= max_side_px { whole } else { side }
-    });
-    // A picture that is repeated must end where it begins again.
-    if size_px == texture.size_px || wrap == Wrap::Repeat {
-        return (Cow::Borrowed(texture), [1.0; 2]);
-    }
-    let mut rgba8 = Vec::with_capacity(4 * size_px[0] as usize * size_px[1] as usize);
-    for y in 0..size_px[1] {
-        let row = 4 * y.min(height - 1) as usize * width as usize;
-        let pixels = &texture.rgba8[row..row + 4 * width as usize];
-        rgba8.extend_from_slice(pixels);
-        for _ in width..size_px[0] {
-            rgba8.extend_from_slice(&pixels[pixels.len() - 4..]);
-        }
-    }
-    let share = [0, 1].map(|k: usize| (f64::from(texture.size_px[k]) / f64::from(size_px[k])) as f32);
-    (Cow::Owned(Texture { size_px, rgba8, encoding: texture.encoding }), share)
-}
-
-/// The texture with its smaller versions, and by what texture coordinates are to be multiplied.
-fn upload_texture(gpu: &GpuContext, texture: &Texture, wrap: Wrap, what: &str) -> Result<(wgpu::TextureView, [f32; 2]), GpuError> {
+fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgpu::TextureView, GpuError> {
     let [width, height] = texture.size_px;
     if width.max(height) > gpu.max_side_px() {
         return Err(GpuError::TooLarge {
@@ -185,8 +149,6 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, wrap: Wrap, what: &str) -
             fix: "reduce the picture",
         });
     }
-    let (texture, share) = aligned(texture, wrap, gpu.max_side_px());
-    let [width, height] = texture.size_px;
     let mips = texture.mips();
     let format = match texture.encoding {
         Encoding::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
@@ -209,34 +171,5 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, wrap: Wrap, what: &str) -
         wgpu::util::TextureDataOrder::LayerMajor,
         &data,
     );
-    Ok((on_device.create_view(&wgpu::TextureViewDescriptor::default()), share))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn picture(width: u32, height: u32) -> Texture {
-        let rgba8 = (0..width * height).flat_map(|i| [(i % width) as u8, (i / width) as u8, 7, 255]).collect();
-        Texture { size_px: [width, height], rgba8, encoding: Encoding::Linear }
-    }
-
-    #[test]
-    fn borders_are_repeated_and_the_picture_keeps_its_place() {
-        let picture = picture(130, 5);
-        let (aligned, share) = aligned(&picture, Wrap::Clamp, 4096);
-        assert_eq!((aligned.size_px, share), ([192, 8], [130.0 / 192.0, 5.0 / 8.0]));
-        let at = |x: usize, y: usize| [aligned.rgba8[4 * (y * 192 + x)], aligned.rgba8[4 * (y * 192 + x) + 1]];
-        assert_eq!([at(0, 0), at(129, 4), at(191, 4), at(129, 7), at(191, 0)], [[0, 0], [129, 4], [129, 4], [129, 4], [129, 0]]);
-    }
-
-    #[test]
-    fn aligned_and_too_large_pictures_stay() {
-        for (width, height, limit) in [(64, 128, 4096), (1, 1, 4096), (32, 2, 4096), (130, 5, 7)] {
-            let picture = picture(width, height);
-            let (kept, share) = aligned(&picture, Wrap::Clamp, limit);
-            assert_eq!(kept.size_px[0], width);
-            assert!(limit < 8 || (kept.size_px[1] == height && share == [1.0; 2]));
-        }
-    }
+    Ok(on_device.create_view(&wgpu::TextureViewDescriptor::default()))
 }
