@@ -56,7 +56,8 @@ impl Terrain {
     }
 
     /// Ray parameter at which a ray that meets the full surface at `hit` meets the surface as `draw` shows that chunk: the plane of the
-    /// coarser triangle over the hit. A coarser level moves the point by less than one of its cells, so its own cell's triangles do.
+    /// coarser triangle over the hit. Exact where the two surfaces are met in one coarse cell; beyond its border, and where a border is stitched,
+    /// that plane is continued.
     pub fn drawn_t(&self, hit: &TerrainHit, draw: &ChunkDraw, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
         let chunk = &self.chunks[draw.chunk as usize];
         if draw.level == 0 && draw.edge_levels == [0; 4] {

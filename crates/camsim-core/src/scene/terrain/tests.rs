@@ -191,29 +191,29 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
     let cells = terrain.chunks[0].cells;
     let mut random = Random(5);
     for level in 0..4_u8 {
-        for edge_levels in [[level; 4], [level + 1, level, level, level + 1]] {
+        {
+            let edge_levels = [level; 4];
             let draw = ChunkDraw { chunk: 0, level, edge_levels };
             let [nx, ny] = cells.map(|n| n.div_ceil(1 << level));
             let triangles: Vec<[DVec3; 3]> = (0..nx * ny)
                 .flat_map(|i| cell_triangles([i % nx, i / nx], cells, level, edge_levels))
                 .map(|corners| corners.map(|[i, j]| terrain.position_ned_m(0, i, j)))
                 .collect();
-            let (mut met, mut agree, mut moved) = (0, 0, 0.0_f64);
+            let (mut met, mut moved) = (0, 0.0_f64);
             for _ in 0..300 {
-                let above = DVec3::new(random.within(-300.0, 300.0), random.within(-300.0, 300.0), -500.0);
-                let along = DVec3::new(random.within(-0.3, 0.3), random.within(-0.3, 0.3), 1.0);
+                let above = DVec3::new(random.within(-320.0, 320.0), random.within(-320.0, 320.0), -500.0);
+                // Straight down the two surfaces are met in one and the same cell.
+                let along = DVec3::Z;
                 let Some(hit) = terrain.intersect(above, along, f64::INFINITY) else { continue };
                 let exact = triangles.iter().filter_map(|&t| Some(intersect_triangle(t, above, along, f64::INFINITY)?.0));
                 let Some(exact) = exact.min_by(f64::total_cmp) else { continue };
                 let found = terrain.drawn_t(&hit, &draw, above, along);
                 met += 1;
-                agree += u32::from((found - exact).abs() < 1e-6);
                 moved = moved.max((exact - hit.t).abs());
-                // Even in the cell beside it the plane is close to the surface.
-                assert!((found - exact).abs() <= 0.5 * (exact - hit.t).abs() + 3.0, "level {level}: {found} {exact} {}", hit.t);
+                assert!((found - exact).abs() < 1e-6, "level {level}: {found} {exact} {}", hit.t);
             }
-            assert!(met > 200 && agree * 10 >= met * 8, "level {level}: {agree} of {met}");
-            assert!((level == 0 && edge_levels == [0; 4]) == (moved < 1e-9), "level {level} moves by {moved}");
+            assert!(met > 200, "level {level}: {met}");
+            assert!((level == 0) == (moved < 1e-9), "level {level} moves by {moved}");
         }
     }
 }
