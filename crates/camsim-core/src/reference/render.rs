@@ -43,7 +43,15 @@ pub struct RenderOptions {
 
 impl Default for RenderOptions {
     fn default() -> Self {
-        Self { channels: vec![Channel::Color], min_samples: 32, max_samples: 1024, tolerance_dn: 0.25, photometric: true, key: None, only: None }
+        Self {
+            channels: vec![Channel::Color],
+            min_samples: 32,
+            max_samples: 1024,
+            tolerance_dn: 0.25,
+            photometric: true,
+            key: None,
+            only: None,
+        }
     }
 }
 
