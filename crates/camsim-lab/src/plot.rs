@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use plotters::{
-    coord::ranged1d::{Ranged, ValueFormatter},
+    coord::ranged1d::{AsRangedCoord, Ranged, ValueFormatter},
     prelude::*,
 };
 
