@@ -12,9 +12,9 @@ pub const MAX_KEYS: u32 = 4;
 /// Allocated heights are multiples of this.
 pub const SIZE_QUANTUM_PX: u32 = 64;
 /// Strips of unseen surface beside silhouettes, ideal pixels, up to which the surface beside them may stand in.
-const HOLE_PX: f64 = 1.0;
+const HOLE_PX: f64 = 4.0;
 /// The same where `quality.max_error_dn` asks for more than the default.
-const FINE_HOLE_PX: f64 = 0.5;
+const FINE_HOLE_PX: f64 = 2.0;
 const DEFAULT_DN: f64 = 1.0;
 
 /// Instant and pose of an ideal frame.
