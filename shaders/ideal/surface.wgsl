@@ -45,36 +45,45 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 @group(1) @binding(1) var surface_sampler: sampler;
 
 // Most taps along the longer axis of a pixel's footprint.
-const MAX_TAPS: f32 = 16.0;
+const MAX_TAPS: f32 = 32.0;
+// Taps along the shorter axis of a footprint that covers more than one texel: a single tap of a smaller version blurs over twice the pixel.
+const SHORT_TAPS: f32 = 2.0;
 
-// Mean of the picture over a pixel: the ellipse that stands for the pixel on the picture is covered along its longer axis by as many
-// trilinear taps as its shorter axis fits in. Own code, because adapters' anisotropic filters are each their own approximation.
+// Mean of the picture over a pixel: the ellipse that stands for the pixel on the picture is covered by a grid of trilinear taps, as many
+// along its longer axis as keep them square. Own code, because adapters' anisotropic filters are each their own approximation.
 fn picture_at(uv: vec2<f32>) -> vec3<f32> {
     let size = vec2<f32>(textureDimensions(surface_texture));
     let dx = dpdx(uv) * size;
     let dy = dpdy(uv) * size;
-    // The ellipse's half axes are the singular values of [dx dy]: eigenvalues of the symmetric [[a, b], [b, c]].
+    // The ellipse's axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b, c]].
     let a = dx.x * dx.x + dy.x * dy.x;
     let b = dx.x * dx.y + dy.x * dy.y;
     let c = dx.y * dx.y + dy.y * dy.y;
     let mean = 0.5 * (a + c);
     let spread = sqrt(0.25 * (a - c) * (a - c) + b * b);
     let longer = sqrt(mean + spread);
-    // A magnified direction needs no more than one tap of the picture itself.
-    let shorter = max(sqrt(max(mean - spread, 0.0)), 1.0);
-    let taps = clamp(ceil(longer / shorter - 0.1), 1.0, MAX_TAPS);
-    let level = log2(max(longer / taps, shorter));
+    let shorter = sqrt(max(mean - spread, 0.0));
+    // What a tap covers, texels; a magnified direction needs no more than one tap of the picture itself.
+    let short_taps = select(1.0, SHORT_TAPS, shorter > 1.0);
+    let covered = max(shorter / short_taps, 1.0);
+    let long_taps = clamp(ceil(longer / covered - 0.1), short_taps, MAX_TAPS);
+    let level = log2(max(longer / long_taps, covered));
     // Of the two expressions of the eigenvector, the one without cancellation.
     let along_x = vec2<f32>(0.5 * (a - c) + spread, b);
     let along_y = vec2<f32>(b, 0.5 * (c - a) + spread);
-    let along = select(along_y, along_x, a >= c);
-    let axis = along * (longer / max(length(along), 1e-30)) / size;
+    let both = select(along_y, along_x, a >= c);
+    // A circle has no longer axis: any will do.
+    let along = select(vec2<f32>(1.0, 0.0), both / max(length(both), 1e-20), spread > 1e-6 * mean);
+    let long_axis = along * longer / size;
+    let short_axis = vec2<f32>(-along.y, along.x) * shorter / size;
     var sum = vec3<f32>(0.0);
-    for (var i = 0.0; i < taps; i += 1.0) {
-        let share = (i + 0.5) / taps - 0.5;
-        sum += textureSampleLevel(surface_texture, surface_sampler, uv + share * axis, level).rgb;
+    for (var j = 0.0; j < short_taps; j += 1.0) {
+        for (var i = 0.0; i < long_taps; i += 1.0) {
+            let at = uv + ((i + 0.5) / long_taps - 0.5) * long_axis + ((j + 0.5) / short_taps - 0.5) * short_axis;
+            sum += textureSampleLevel(surface_texture, surface_sampler, at, level).rgb;
+        }
     }
-    return sum / taps;
+    return sum / (long_taps * short_taps);
 }
 
 @fragment

@@ -163,6 +163,29 @@ impl ColorImage<'_> {
         let bottom = load(0.0, 1.0).lerp(load(1.0, 1.0), t.x);
         top.lerp(bottom, t.y)
     }
+
+    /// By a Catmull-Rom spline, edges held, without the four corners of its 4x4 pixels (at most 0.4 % each): between pixels a bilinear read
+    /// blurs, this hardly does. May leave the range of its pixels by a tenth of their contrast.
+    #[must_use]
+    pub fn spline(&self, at_px: DVec2) -> DVec3 {
+        let base = at_px.floor();
+        let f = at_px - base;
+        let w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
+        let w1 = 1.0 + f * f * (-2.5 + 1.5 * f);
+        let w2 = f * (0.5 + f * (2.0 - 1.5 * f));
+        let w3 = f * f * (-0.5 + 0.5 * f);
+        let w12 = w1 + w2;
+        let (before, between, after) = (base - 1.0, base + w2 / w12, base + 2.0);
+        let reads = [
+            (w12.x * w12.y, between),
+            (w12.x * w0.y, DVec2::new(between.x, before.y)),
+            (w0.x * w12.y, DVec2::new(before.x, between.y)),
+            (w3.x * w12.y, DVec2::new(after.x, between.y)),
+            (w12.x * w3.y, DVec2::new(between.x, after.y)),
+        ];
+        let sum: DVec3 = reads.iter().map(|&(weight, at)| weight * self.sample(at)).sum();
+        sum / reads.iter().map(|read| read.0).sum::<f64>()
+    }
 }
 
 /// Footprint of an output pixel in the ideal frame: columns of d(ideal px)/d(output px) and taps along each.
@@ -192,6 +215,12 @@ impl Footprint {
         let fy = (f64::from((i / nx) % ny) + 0.5) / f64::from(ny) - 0.5;
         self.dx * fx + self.dy * fy
     }
+
+    /// Colour of tap `i` around a source. A pixel that takes a single tap needs the better interpolation; several taps are an average anyway.
+    #[must_use]
+    pub fn tap_color(&self, color: &ColorImage<'_>, source_px: DVec2, i: u32) -> DVec3 {
+        if self.taps == [1, 1] { color.spline(source_px) } else { color.sample(source_px + self.offset_px(i)) }
+    }
 }
 
 /// Mean colour over the exposure along the polyline `nodes_px` (equal time on each segment), midpoints uniform in time.
@@ -200,7 +229,7 @@ pub fn gather(nodes_px: &[DVec2], area: &Footprint, color: &ColorImage<'_>, samp
     let taps = area.taps[0] * area.taps[1];
     if nodes_px.len() < 2 {
         let at = nodes_px.first().copied().unwrap_or_default();
-        return (0..taps).map(|i| color.sample(at + area.offset_px(i))).sum::<DVec3>() / f64::from(taps);
+        return (0..taps).map(|i| area.tap_color(color, at, i)).sum::<DVec3>() / f64::from(taps);
     }
     let segments = nodes_px.len() as u32 - 1;
     let at_least = taps.div_ceil(segments);
@@ -210,7 +239,7 @@ pub fn gather(nodes_px: &[DVec2], area: &Footprint, color: &ColorImage<'_>, samp
         let mut part = DVec3::ZERO;
         for i in 0..count {
             let t = (f64::from(i) + 0.5) / f64::from(count);
-            part += color.sample(ends[0].lerp(ends[1], t) + area.offset_px(tap));
+            part += area.tap_color(color, ends[0].lerp(ends[1], t), tap);
             tap += 1;
         }
         sum += part / f64::from(count);
@@ -262,6 +291,23 @@ mod tests {
         let image = InverseDepthImage { size_px: [2, 2], values: &values };
         assert_eq!(image.inverse_depth(DVec2::new(0.4, 0.2)), f64::from(0.1_f32));
         assert_eq!(image.inverse_depth(DVec2::new(0.6, 0.2)), f64::from(0.001_f32));
+    }
+
+    #[test]
+    fn the_spline_meets_its_pixels_and_beats_bilinear_on_a_wave() {
+        let wave = |x: f64, y: f64| 0.5 + 0.25 * (1.3 * x).sin() + 0.2 * (1.1 * y + 0.4).sin();
+        let rgba: Vec<f32> = (0..32 * 32).flat_map(|i| [wave(f64::from(i % 32), f64::from(i / 32)) as f32, 0.5, 0.0, 1.0]).collect();
+        let color = ColorImage { size_px: [32, 32], rgba: &rgba };
+        assert!(color.spline(DVec2::new(7.0, 9.0)).distance(color.sample(DVec2::new(7.0, 9.0))) < 1e-12);
+        let (mut spline, mut bilinear) = (0.0, 0.0);
+        for k in 0..200 {
+            let at = DVec2::new(8.0 + 0.077 * f64::from(k), 20.0 - 0.053 * f64::from(k));
+            let exact = wave(at.x, at.y);
+            spline += (color.spline(at).x - exact).powi(2);
+            bilinear += (color.sample(at).x - exact).powi(2);
+            assert!((color.spline(at).y - 0.5).abs() < 1e-12, "a constant stays");
+        }
+        assert!(spline < 0.1 * bilinear, "{spline:.2e} {bilinear:.2e}");
     }
 
     #[test]

@@ -93,7 +93,8 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
 }
 
 fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
-    var edge = plain.color.a < 0.9999;
+    // Above 1 where a mark lies under a negative weight of the spline.
+    var edge = abs(plain.color.a - 1.0) > 1e-4;
     for (var node = 0u; HAS_PARALLAX && !edge && node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
         edge = near_edge(ray.uv, pose_at_node(pixel, node));
     }

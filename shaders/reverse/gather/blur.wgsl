@@ -35,7 +35,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
             if (edge) {
                 at_px = temporal_inverse(ray.uv, mix_pose(pose, next_pose, t)).at_px;
             }
-            part += ideal_color_at(at_px + tap_offset_px(area, tap));
+            part += tap_color(area, at_px, tap);
             tap++;
         }
         sum += part / f32(count);

@@ -25,3 +25,11 @@ fn tap_offset_px(area: Footprint, i: u32) -> vec2<f32> {
     let f = tap_fraction(area, i);
     return area.dx * f.x + area.dy * f.y;
 }
+
+// Colour of tap i around a source. A pixel that takes a single tap needs the better interpolation; several taps are an average anyway.
+fn tap_color(area: Footprint, source_px: vec2<f32>, i: u32) -> vec4<f32> {
+    if (area.taps.x * area.taps.y == 1u) {
+        return ideal_color_by_spline(source_px);
+    }
+    return ideal_color_at(source_px + tap_offset_px(area, i));
+}

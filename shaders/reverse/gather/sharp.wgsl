@@ -7,7 +7,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let taps = area.taps.x * area.taps.y;
     var sum = vec4<f32>(0.0);
     for (var i = 0u; i < taps; i++) {
-        sum += ideal_color_at(source.at_px + tap_offset_px(area, i));
+        sum += tap_color(area, source.at_px, i);
     }
     return Gathered(sum / f32(taps), source.inside);
 }
