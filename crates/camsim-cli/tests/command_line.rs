@@ -262,6 +262,7 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &scenario, "--format", "none,png"], "stands alone"),
         (vec!["render", &scenario, "--preset", "paper", "--set", "quality.solver=linear"], "quality.solver"),
         (vec!["render", &scenario, "--backend", "gpu", "--set", "quality.solver=oracle"], "leave --backend out"),
+        (vec!["verify", &scenario, "--set", "quality.solver=oracle"], "verified against"),
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),

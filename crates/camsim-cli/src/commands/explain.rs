@@ -2,6 +2,7 @@
 
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
+    scenario::{Auto, Solver},
     scene::select_lod,
     tracker::{ResolvedLimits, Saturation},
 };
@@ -85,6 +86,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let frames = loaded.sequence.frames;
     if args.frame >= frames {
         return Err(Failure::bad_input(FrameListError::Outside { frame: args.frame, frames }));
+    }
+    if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+        console
+            .warn("quality.solver is \"oracle\": `render` casts every ray and needs no plan; this is the one that the engine would make");
     }
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
     let plan = planner.plan(args.frame).or_bad_input()?;

@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use camsim_core::{
     plan::{FramePlan, Predicted},
     reference::{CoordErrors, ErrorStats, KeyFrame, Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
-    scenario::Channel,
+    scenario::{Auto, Channel, Solver},
 };
 use camsim_gpu::{
     AdapterChoice, Engine,
@@ -106,6 +106,11 @@ impl From<ErrorStats> for Figures {
 /// Measures and compares.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = args.scenario.read()?;
+    if scenario.quality.solver == Auto::Value(Solver::Oracle) {
+        return Err(Failure::bad_input(anyhow!(
+            "quality.solver is \"oracle\", which is what plans are verified against: leave it out, or add --set quality.solver=auto"
+        )));
+    }
     let loaded = inputs::load(&scenario, console)?;
     let sequence = &loaded.sequence;
     let frames = match &args.frames {
