@@ -14,7 +14,6 @@ use crate::{
     mount::CameraPath,
     pose::CameraPose,
     scenario::{Channel, Preset},
-    scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
     temporal::{IdealGeometry, displacement::Twist},
@@ -34,6 +33,7 @@ mod motion;
 pub mod paper;
 mod probes;
 mod rounding;
+mod surfaces;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
@@ -226,6 +226,7 @@ pub struct Planner {
     fixed: Option<Arc<LensReach>>,
     outline: edges::SceneOutline,
     grain: grain::SceneGrain,
+    surfaces: surfaces::Surfaces,
     truth: bool,
     max_side_px: u32,
 }
@@ -246,7 +247,8 @@ impl Planner {
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let outline = edges::SceneOutline::new(&sequence.scene);
         let grain = grain::SceneGrain::new(&sequence.scene);
-        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, truth, max_side_px })
+        let surfaces = surfaces::Surfaces::new(sequence.scene.clone());
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px })
     }
 
     /// The sequence.
@@ -300,7 +302,7 @@ impl Planner {
         let is_paper = quality.preset == Preset::Paper;
         let geometry = |keys: &[KeyFrame]| {
             let displaced = demanded.map(|stage| (stage, key_twist));
-            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene, displaced)
+            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced)
         };
         let one_key = keys::spread(path, window_s, 1);
         let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key) };
@@ -308,7 +310,7 @@ impl Planner {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
-        let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, scene);
+        let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, &self.surfaces);
         let mut skipped = Vec::new();
         let ray = if is_paper { paper::ray_stage(&reach.camera) } else { ray_stage(&reach, &mut skipped) };
         let (blur, edges) = if is_paper {
@@ -335,6 +337,7 @@ impl Planner {
             blur,
             max_taps,
             grain: &self.grain,
+            surfaces: &self.surfaces,
         };
         let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         motion::note_skips(&motion, temporal, &mut skipped);
@@ -433,15 +436,6 @@ impl IdealGeometry {
         let high = (size - 0.5 - self.principal_px) / self.focal_px;
         [low.x, high.x, low.y, high.y]
     }
-}
-
-/// Lower bound of the planar depth of anything in view, metres; infinite with nothing in view.
-fn nearest_m(scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> f64 {
-    let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
-    let terrain = scene.terrain.as_ref().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
-    let meshes = scene.meshes.iter().map(|mesh| mesh.min_distance_m(pose.position_ned_m)).fold(f64::INFINITY, f64::min);
-    // Slant range to planar depth by the widest ray; the camera may come closer within the window.
-    ((terrain.min(meshes) - travel_m) / (1.0 + r2).sqrt()).max(2.0 * NEAR_M)
 }
 
 /// Line axis and the number of pose-table fields (2 where sideways readout meets interlacing).

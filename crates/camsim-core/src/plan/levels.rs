@@ -4,7 +4,7 @@
 
 use glam::{DMat2, DVec2};
 
-use super::{BlurStage, dry_run::Outcome, grain::SceneGrain, probes::Probe};
+use super::{BlurStage, dry_run::Truth, grain::SceneGrain, probes::Probe};
 use crate::temporal::{Footprint, IdealGeometry, samples_for};
 
 /// RMS error of one bilinear tap of an ideal frame, in RMS steps between its pixels.
@@ -24,15 +24,15 @@ impl Levels {
     /// At a probe whose source runs from `ends[0]` to `ends[1]` within the exposure.
     pub fn new(
         probe: &Probe,
-        run: &Outcome,
+        truth: &Truth,
         ends_px: [DVec2; 2],
         ideal: &IdealGeometry,
         grain: &SceneGrain,
         max_taps: u32,
         blur: Option<BlurStage>,
     ) -> Self {
-        let Some(surface) = run.surface else { return Self::default() };
-        let px_m = 1.0 / (run.key_inverse_depth * ideal.focal_px.x.min(ideal.focal_px.y));
+        let Some(surface) = truth.surface else { return Self::default() };
+        let px_m = 1.0 / (truth.key_inverse_depth * ideal.focal_px.x.min(ideal.focal_px.y));
         let step = grain.step(surface, px_m);
         let ideal_from_px = DMat2::from_diagonal(ideal.focal_px) * probe.uv_from_px;
         let area = Footprint::new(ideal_from_px.x_axis, ideal_from_px.y_axis, max_taps);
