@@ -49,8 +49,6 @@ pub(super) struct Outcome {
     pub inverse_depth: f64,
     /// The same of the key camera; 0 = sky.
     pub key_inverse_depth: f64,
-    /// What is seen: 0 = terrain, 1 + i = mesh i, `None` = sky.
-    pub surface: Option<usize>,
     /// One pose for all lines.
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
@@ -71,7 +69,6 @@ pub(super) struct Outcome {
 struct Met {
     /// Planar depth for a direction with z = 1 in its camera.
     depth_m: f64,
-    surface: usize,
     terrain: Option<TerrainHit>,
 }
 
@@ -102,7 +99,6 @@ impl Trial<'_> {
             at_px: truth_px,
             inverse_depth: w,
             key_inverse_depth: w / in_key.z,
-            surface: met.map(|met| met.surface),
             still_px: off(self.ideal.px_from_point(probe.uv.extend(1.0))),
             parallax_px: off(rotated_px),
             ..Outcome::default()
@@ -259,11 +255,11 @@ fn meet(scene: &Scene, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met>
         .terrain
         .as_ref()
         .and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY))
-        .map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) });
-    for (i, mesh) in scene.meshes.iter().enumerate() {
+        .map(|hit| Met { depth_m: hit.t, terrain: Some(hit) });
+    for mesh in &scene.meshes {
         let limit = first.map_or(f64::INFINITY, |met| met.depth_m);
         if let Some((t, _)) = mesh.intersect(origin_ned_m, direction_ned, limit) {
-            first = Some(Met { depth_m: t, surface: 1 + i, terrain: None });
+            first = Some(Met { depth_m: t, terrain: None });
         }
     }
     first
