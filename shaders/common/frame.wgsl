@@ -35,8 +35,7 @@ struct Frame {
     frame_number: u32,
     // 1: one luminance value for all three channels.
     mono: u32,
-    // Depth difference in inverse metres times this is a parallax in ideal pixels over the exposure.
-    exposure_travel_px_m: f32,
+    pad1: u32,
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,

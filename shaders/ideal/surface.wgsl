@@ -46,8 +46,22 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 
 // Most taps along the longer axis of a pixel's footprint.
 const MAX_TAPS: f32 = 32.0;
-// Taps along the shorter axis of a footprint that covers more than one texel: a single tap of a smaller version blurs over twice the pixel.
+// Taps along the shorter axis of a footprint that is wider than half a texel: a single tap of a smaller version blurs over twice the pixel,
+// and one of the picture itself not at all.
 const SHORT_TAPS: f32 = 2.0;
+const ONE_TAP: f32 = 0.5;
+
+// Variance (times 12) that a version of 2^level texels adds to what the picture has between its texels: of the mean of so many, and of the
+// wider ramps.
+fn version_variance(level: f32) -> f32 {
+    let below = floor(level);
+    return 3.0 * (mix(exp2(2.0 * below), exp2(2.0 * below + 2.0), level - below) - 1.0);
+}
+
+// Length along which `taps` taps and the version that they read have the variance of a mean over `side`.
+fn tap_length(side: f32, taps: f32, version: f32) -> f32 {
+    return sqrt(max(side * side - version, 0.0) / max(1.0 - 1.0 / (taps * taps), 0.5));
+}
 
 // Mean of the picture over a pixel: the ellipse that stands for the pixel on the picture is covered by a grid of trilinear taps, as many
 // along its longer axis as keep them square. Own code, because adapters' anisotropic filters are each their own approximation.
@@ -63,8 +77,8 @@ fn picture_at(uv: vec2<f32>) -> vec3<f32> {
     let spread = sqrt(0.25 * (a - c) * (a - c) + b * b);
     let longer = sqrt(mean + spread);
     let shorter = sqrt(max(mean - spread, 0.0));
-    // What a tap covers, texels; a magnified direction needs no more than one tap of the picture itself.
-    let short_taps = select(1.0, SHORT_TAPS, shorter > 1.0);
+    // What a tap covers, texels; a direction in which a texel is two pixels wide needs no more than one tap.
+    let short_taps = select(1.0, SHORT_TAPS, shorter > ONE_TAP);
     let covered = max(shorter / short_taps, 1.0);
     let long_taps = clamp(ceil(longer / covered - 0.1), short_taps, MAX_TAPS);
     let level = log2(max(longer / long_taps, covered));
@@ -74,8 +88,9 @@ fn picture_at(uv: vec2<f32>) -> vec3<f32> {
     let both = select(along_y, along_x, a >= c);
     // A circle has no longer axis: any will do.
     let along = select(vec2<f32>(1.0, 0.0), both / max(length(both), 1e-20), spread > 1e-6 * mean);
-    let long_axis = along * longer / size;
-    let short_axis = vec2<f32>(-along.y, along.x) * shorter / size;
+    let version = version_variance(level);
+    let long_axis = along * tap_length(longer, long_taps, version) / size;
+    let short_axis = vec2<f32>(-along.y, along.x) * tap_length(shorter, short_taps, version) / size;
     var sum = vec3<f32>(0.0);
     for (var j = 0.0; j < short_taps; j += 1.0) {
         for (var i = 0.0; i < long_taps; i += 1.0) {

@@ -12,14 +12,8 @@ fn inside_ideal(at_px: vec2<f32>) -> bool {
     return all(at_px >= vec2<f32>(-0.5)) && all(at_px <= vec2<f32>(frame.ideal_size_px) - 0.5);
 }
 
-// Inverse planar depth 1/z (1/m) and the spread of the four texels around.
-struct InverseDepth {
-    value: f32,
-    spread: f32,
-}
-
-// Bilinear in 1/z, which is exact on planes; the nearest texel where the four belong to different surfaces.
-fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
+// Inverse planar depth 1/z, 1/m: bilinear in 1/z, which is exact on planes; the nearest texel where the four belong to different surfaces.
+fn inverse_depth(at_px: vec2<f32>) -> f32 {
     let last = vec2<f32>(frame.ideal_size_px) - 1.0;
     let at = clamp(at_px, vec2<f32>(0.0), last);
     let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
@@ -36,7 +30,7 @@ fn inverse_depth(at_px: vec2<f32>) -> InverseDepth {
     let mixed = mix(mix(d00, d10, t.x), mix(d01, d11, t.x), t.y);
     let nearest = select(select(d00, d10, t.x > 0.5), select(d01, d11, t.x > 0.5), t.y > 0.5);
     let one_surface = low > 0.9 * high;
-    return InverseDepth(select(nearest, mixed, one_surface) / frame.near_m, (high - low) / frame.near_m);
+    return select(nearest, mixed, one_surface) / frame.near_m;
 }
 
 // Linear colour, bilinear; alpha below 1 where a silhouette is marked.
@@ -47,15 +41,17 @@ fn ideal_color_at(at_px: vec2<f32>) -> vec4<f32> {
     return textureSampleLevel(ideal_color, ideal_sampler, at / size, 0.0);
 }
 
-// The same by a Catmull-Rom spline: a bilinear read between pixels blurs. Its 4x4 texels are five bilinear reads; without the corners, whose
-// weights are at most 0.4 %. Twin: camsim_core::temporal::ColorImage::spline.
-fn ideal_color_by_spline(at_px: vec2<f32>) -> vec4<f32> {
+// The same by a cubic spline: a bilinear read between pixels blurs. Softness 0 is Catmull-Rom's, which does not; 1 is the B-spline, with a
+// variance of a third of a square pixel. Its 4x4 texels are five bilinear reads; without the corners, whose weights are at most 0.4 % at
+// softness 0 and 0.8 % at 0.5. Twin: camsim_core::temporal::ColorImage::spline.
+fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
     let base = floor(at_px);
     let f = at_px - base;
-    let w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
-    let w1 = 1.0 + f * f * (-2.5 + 1.5 * f);
-    let w2 = f * (0.5 + f * (2.0 - 1.5 * f));
-    let w3 = f * f * (-0.5 + 0.5 * f);
+    let g = 1.0 - f;
+    let w0 = mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0, softness);
+    let w1 = mix(1.0 + f * f * (-2.5 + 1.5 * f), (4.0 + f * f * (3.0 * f - 6.0)) / 6.0, softness);
+    let w2 = mix(f * (0.5 + f * (2.0 - 1.5 * f)), (4.0 + g * g * (3.0 * g - 6.0)) / 6.0, softness);
+    let w3 = mix(f * f * (-0.5 + 0.5 * f), f * f * f / 6.0, softness);
     let w12 = w1 + w2;
     let before = base - 1.0;
     let between = base + w2 / w12;

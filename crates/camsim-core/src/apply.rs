@@ -22,7 +22,7 @@ use crate::{
     sequence::GrayImage,
     shutter::{Shutter, ShutterError},
     temporal::{
-        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source,
+        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage,
         displacement::{self, RK2_STEP_DEG, Twist},
         gather, samples_for,
     },
@@ -304,7 +304,7 @@ impl<'a> Pipeline<'a> {
         let sample = |i: u32| {
             let phase = (f64::from(i) + 0.5) / f64::from(count) - 0.5;
             let source = self.source_of_ray(uv, dt_s + phase * exposure_s);
-            source.map(|source| color.sample(source.at_px + area.offset_px(i)))
+            source.map(|source| area.tap_color(&color, source.at_px, i))
         };
         let sum: Option<DVec3> = (0..count).map(sample).sum();
         sum.map(|sum| sum / f64::from(count))
@@ -340,7 +340,7 @@ impl<'a> Pipeline<'a> {
             self.frame.geometry.focal_px * (moved.truncate() - p.truncate() * (moved.z / p.z)) / p.z
         };
         let focal = self.camera.focal_px;
-        Footprint::new(step(DVec2::new(1.0 / focal.x, 0.0)), step(DVec2::new(0.0, 1.0 / focal.y)), MAX_TAPS)
+        Footprint::new(step(DVec2::new(1.0 / focal.x, 0.0)), step(DVec2::new(0.0, 1.0 / focal.y)), TapStage::Grid { most: MAX_TAPS })
     }
 
     /// Nodes so that no chord misses the path by more than [`CHORD_MISS_PX`], seen at a grid of pixels. The miss falls with the square of

@@ -16,7 +16,7 @@ use crate::{
     scenario::{Channel, Preset},
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
-    temporal::{IdealGeometry, displacement::Twist},
+    temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
 mod bounds;
@@ -34,6 +34,7 @@ pub mod paper;
 mod probes;
 mod rounding;
 mod surfaces;
+mod transfer;
 
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
@@ -135,8 +136,6 @@ pub struct Motion {
     pub blur_px: f64,
     /// Bound on how far a straight path misses the curved one, ideal pixels.
     pub blur_sagitta_px: f64,
-    /// Parallax over the exposure for one inverse metre of depth difference, ideal pixels times metres.
-    pub exposure_travel_px_m: f64,
 }
 
 /// Work that this frame does not need.
@@ -185,8 +184,8 @@ pub struct FramePlan {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
-    /// Most footprint taps an axis.
-    pub max_taps: u32,
+    /// What reads the ideal frame for each sample.
+    pub taps: TapStage,
     /// Fog after the gather (the paper's); otherwise it is in the ideal frame.
     pub linear_fog: Option<LinearFog>,
     /// Whether depth and coordinates are wanted beside the picture.
@@ -300,30 +299,49 @@ impl Planner {
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
         let is_paper = quality.preset == Preset::Paper;
-        let geometry = |keys: &[KeyFrame]| {
+        let geometry = |keys: &[KeyFrame], scale: f64| {
             let displaced = demanded.map(|stage| (stage, key_twist));
-            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced)
+            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced, scale)
         };
         let one_key = keys::spread(path, window_s, 1);
-        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key) };
+        let least_scale = reach.least_scale();
+        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale) };
+        let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
+        let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, &self.surfaces);
+        let nodes_of = |motion: &Motion, ideal: &IdealGeometry, skipped: &mut Vec<Skip>| {
+            motion::exposure_nodes(motion, quality, &reach, path, &self.shutter, stamp_s, ideal, skipped)
+        };
+        let mut motion = measure(&ideal);
+        let sampling = if is_paper {
+            levels::Sampling::of_paper()
+        } else {
+            let side_px = ideal.size_px[0].max(ideal.size_px[1]);
+            let fits = |scale: f64| f64::from(side_px) * scale / least_scale < f64::from(self.max_side_px);
+            let nodes = nodes_of(&motion, &ideal, &mut Vec::new()).unwrap_or(1);
+            prospect.choose(quality, least_scale, nodes, fits)
+        };
+        if sampling.scale != least_scale && !is_paper {
+            ideal = geometry(&one_key, sampling.scale);
+            motion = measure(&ideal);
+        }
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
-        let motion = motion::measure(&reach, path, &self.shutter, stamp_s, key_s, &ideal, &self.surfaces);
         let mut skipped = Vec::new();
         let ray = if is_paper { paper::ray_stage(&reach.camera) } else { ray_stage(&reach, &mut skipped) };
         let (blur, edges) = if is_paper {
             skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
             (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
-            let blur = motion::blur_stage(&motion, quality, &reach, path, &self.shutter, stamp_s, &ideal, &mut skipped);
-            let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, quality, &motion));
+            let nodes = nodes_of(&motion, &ideal, &mut skipped);
+            let blur = nodes.map(|nodes| sampling.blur_stage(nodes, quality, motion.blur_px));
+            let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, &sampling, quality, &motion));
             let travel_m = motion.travel_m;
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
             (blur, edges)
         };
-        let max_taps = if is_paper { 1 } else { quality.footprint_taps.value().unwrap_or(4).max(1) };
+        let expected = prospect.expect(sampling.scale, sampling.taps, blur);
         let case = error::Case {
             reach: &reach,
             sequence: &self.sequence,
@@ -335,16 +353,16 @@ impl Planner {
             key_twist,
             ray,
             blur,
-            max_taps,
-            grain: &self.grain,
             surfaces: &self.surfaces,
+            expected,
+            levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
         };
         let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         motion::note_skips(&motion, temporal, &mut skipped);
         let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(path, window_s, count);
-            let ideal = geometry(&keys);
+            let ideal = geometry(&keys, sampling.scale);
             (keys, ideal)
         });
         let keys = keys.map_or(one_key, |(keys, of_keys)| {
@@ -370,7 +388,7 @@ impl Planner {
             temporal,
             blur,
             edges,
-            max_taps,
+            taps: sampling.taps,
             linear_fog: if is_paper { paper::fog(scene) } else { None },
             truth: self.truth,
             motion,

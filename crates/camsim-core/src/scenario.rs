@@ -195,6 +195,8 @@ pub struct QualitySpec {
     pub blur_samples: Auto<u32>,
     /// Footprint taps per axis of an output pixel.
     pub footprint_taps: Auto<u32>,
+    /// Pixels of the ideal frame for each of the camera's, along a side.
+    pub ideal_scale: Auto<f64>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
 }
@@ -210,6 +212,7 @@ impl Default for QualitySpec {
             iterations: Auto::Auto,
             blur_samples: Auto::Auto,
             footprint_taps: Auto::Auto,
+            ideal_scale: Auto::Auto,
             key_frames: Auto::Auto,
         }
     }

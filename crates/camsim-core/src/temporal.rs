@@ -4,6 +4,7 @@
 //! [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
+use serde::Serialize;
 
 pub mod displacement;
 pub mod edges;
@@ -164,16 +165,20 @@ impl ColorImage<'_> {
         top.lerp(bottom, t.y)
     }
 
-    /// By a Catmull-Rom spline, edges held, without the four corners of its 4x4 pixels (at most 0.4 % each): between pixels a bilinear read
-    /// blurs, this hardly does. May leave the range of its pixels by a tenth of their contrast.
+    /// By a cubic spline, edges held: between pixels a bilinear read blurs. Softness 0 is Catmull and Rom's spline, which hardly does; 1 is
+    /// the B-spline, with a variance of a third of a square pixel an axis; between them weights and variance are mixed. Without the
+    /// four corners of its 4x4 pixels (at most 0.4 % each at softness 0, 0.8 % at 0.5). May leave the range of its pixels by a tenth
+    /// of their contrast.
     #[must_use]
-    pub fn spline(&self, at_px: DVec2) -> DVec3 {
+    pub fn spline(&self, at_px: DVec2, softness: DVec2) -> DVec3 {
         let base = at_px.floor();
         let f = at_px - base;
-        let w0 = f * (-0.5 + f * (1.0 - 0.5 * f));
-        let w1 = 1.0 + f * f * (-2.5 + 1.5 * f);
-        let w2 = f * (0.5 + f * (2.0 - 1.5 * f));
-        let w3 = f * f * (-0.5 + 0.5 * f);
+        let g = 1.0 - f;
+        let mix = |sharp: DVec2, soft: DVec2| sharp + (soft - sharp) * softness;
+        let w0 = mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0);
+        let w1 = mix(1.0 + f * f * (-2.5 + 1.5 * f), (4.0 + f * f * (3.0 * f - 6.0)) / 6.0);
+        let w2 = mix(f * (0.5 + f * (2.0 - 1.5 * f)), (4.0 + g * g * (3.0 * g - 6.0)) / 6.0);
+        let w3 = mix(f * f * (-0.5 + 0.5 * f), f * f * f / 6.0);
         let w12 = w1 + w2;
         let (before, between, after) = (base - 1.0, base + w2 / w12, base + 2.0);
         let reads = [
@@ -188,23 +193,54 @@ impl ColorImage<'_> {
     }
 }
 
-/// Footprint of an output pixel in the ideal frame: columns of d(ideal px)/d(output px) and taps along each.
+/// What reads the ideal frame for one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TapStage {
+    /// One bilinear read.
+    Bilinear,
+    /// One read of a cubic spline, as soft as the pixel is wide.
+    Spline,
+    /// The same where a pixel is up to sqrt 3 ideal pixels wide, a grid of bilinear reads where it is wider.
+    Grid {
+        /// Reads along a side, at most.
+        most: u32,
+    },
+}
+
+/// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has this variance (times 12), 1 of
+/// the ideal pixel and 2 of the tent.
+const TENT_PX2: f64 = 3.0;
+
+/// Reads of an output pixel in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
-    /// Ideal pixels per output pixel along x.
+    /// Extent of the grid of reads along x and y, ideal pixels: the pixel's own, less what each read covers, so that the variances agree.
     pub dx: DVec2,
-    /// Ideal pixels per output pixel along y.
+    /// See above.
     pub dy: DVec2,
-    /// Taps along each.
+    /// Reads along each.
     pub taps: [u32; 2],
+    /// Softness of the one spline; `None` for bilinear reads.
+    pub spline: Option<DVec2>,
 }
 
 impl Footprint {
-    /// As many taps as ideal pixels are covered, at most `max_taps` an axis.
+    /// Of a pixel with the sides `dx` and `dy`, columns of d(ideal px)/d(output px).
     #[must_use]
-    pub fn new(dx: DVec2, dy: DVec2, max_taps: u32) -> Self {
-        let taps = [dx, dy].map(|d| ((d.length() - 0.1).ceil() as u32).clamp(1, max_taps.max(1)));
-        Self { dx, dy, taps }
+    pub fn new(dx: DVec2, dy: DVec2, stage: TapStage) -> Self {
+        let most = match stage {
+            TapStage::Grid { most } => most.max(1),
+            TapStage::Bilinear | TapStage::Spline => 1,
+        };
+        let taps = [dx, dy].map(|side| match side.length_squared() > TENT_PX2 {
+            true => ((side.length() - 0.1).ceil() as u32).clamp(1, most),
+            false => 1,
+        });
+        let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
+        let spline = (stage != TapStage::Bilinear && taps == [1, 1]).then(|| DVec2::new(softness(dx), softness(dy)));
+        let [dx, dy] = [(dx, taps[0]), (dy, taps[1])].map(|(side, taps)| spread(side, taps));
+        Self { dx, dy, taps, spline }
     }
 
     /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
@@ -216,11 +252,23 @@ impl Footprint {
         self.dx * fx + self.dy * fy
     }
 
-    /// Colour of tap `i` around a source. A pixel that takes a single tap needs the better interpolation; several taps are an average anyway.
+    /// Colour of tap `i` around a source.
     #[must_use]
     pub fn tap_color(&self, color: &ColorImage<'_>, source_px: DVec2, i: u32) -> DVec3 {
-        if self.taps == [1, 1] { color.spline(source_px) } else { color.sample(source_px + self.offset_px(i)) }
+        match self.spline {
+            Some(softness) => color.spline(source_px, softness),
+            None => color.sample(source_px + self.offset_px(i)),
+        }
     }
+}
+
+/// `n` reads evenly over a length d have the variance `d^2 (1 - 1/n^2) / 12`.
+fn spread(side: DVec2, taps: u32) -> DVec2 {
+    if taps == 1 {
+        return DVec2::ZERO;
+    }
+    let length2 = side.length_squared();
+    side * ((length2 - TENT_PX2).max(0.0) / (1.0 - f64::from(taps * taps).recip()) / length2).sqrt()
 }
 
 /// Mean colour over the exposure along the polyline `nodes_px` (equal time on each segment), midpoints uniform in time.
@@ -298,16 +346,37 @@ mod tests {
         let wave = |x: f64, y: f64| 0.5 + 0.25 * (1.3 * x).sin() + 0.2 * (1.1 * y + 0.4).sin();
         let rgba: Vec<f32> = (0..32 * 32).flat_map(|i| [wave(f64::from(i % 32), f64::from(i / 32)) as f32, 0.5, 0.0, 1.0]).collect();
         let color = ColorImage { size_px: [32, 32], rgba: &rgba };
-        assert!(color.spline(DVec2::new(7.0, 9.0)).distance(color.sample(DVec2::new(7.0, 9.0))) < 1e-12);
+        assert!(color.spline(DVec2::new(7.0, 9.0), DVec2::ZERO).distance(color.sample(DVec2::new(7.0, 9.0))) < 1e-12);
         let (mut spline, mut bilinear) = (0.0, 0.0);
         for k in 0..200 {
             let at = DVec2::new(8.0 + 0.077 * f64::from(k), 20.0 - 0.053 * f64::from(k));
             let exact = wave(at.x, at.y);
-            spline += (color.spline(at).x - exact).powi(2);
+            spline += (color.spline(at, DVec2::ZERO).x - exact).powi(2);
             bilinear += (color.sample(at).x - exact).powi(2);
-            assert!((color.spline(at).y - 0.5).abs() < 1e-12, "a constant stays");
+            assert!((color.spline(at, DVec2::splat(0.3)).y - 0.5).abs() < 1e-12, "a constant stays");
         }
         assert!(spline < 0.1 * bilinear, "{spline:.2e} {bilinear:.2e}");
+    }
+
+    #[test]
+    fn reads_have_the_variance_of_the_pixel_that_they_stand_for() {
+        // A parabola's mean over an area tells its variance.
+        let size_px = [40, 40];
+        let parabola = |i: u32| (f64::from(i % 40) - 20.0).powi(2) + 1.0 / 12.0;
+        let rgba: Vec<f32> = (0..1600).flat_map(|i| [parabola(i) as f32, 0.0, 0.0, 1.0]).collect();
+        let color = ColorImage { size_px, rgba: &rgba };
+        let mean = |width_px: f64, stage: TapStage| {
+            let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
+            let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
+            // Over all positions between the pixels, less the parabola at the centre.
+            (0..16).map(|k| gather(&[at(k)], &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
+        };
+        for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
+            let found = mean(width_px, TapStage::Grid { most: 4 });
+            assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
+        }
+        // What one bilinear read is off by.
+        assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
     }
 
     #[test]
@@ -315,7 +384,7 @@ mod tests {
         let size_px = [64, 8];
         let rgba: Vec<f32> = (0..64 * 8).flat_map(|i| [(i % 64) as f32, 1.0, 0.0, 1.0]).collect();
         let color = ColorImage { size_px, rgba: &rgba };
-        let area = Footprint::new(DVec2::new(2.3, 0.0), DVec2::new(0.0, 1.0), 4);
+        let area = Footprint::new(DVec2::new(2.3, 0.0), DVec2::new(0.0, 1.0), TapStage::Grid { most: 4 });
         assert_eq!(area.taps, [3, 1]);
         let nodes = [DVec2::new(10.0, 3.0), DVec2::new(20.0, 3.0), DVec2::new(40.0, 3.0)];
         let mean = gather(&nodes, &area, &color, 2.0, 256);

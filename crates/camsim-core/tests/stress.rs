@@ -19,7 +19,7 @@ fn checker(size_px: [u32; 2]) -> Vec<f32> {
     (0..size_px[0] * size_px[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect()
 }
 
-const POINT: Footprint = Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1] };
+const POINT: Footprint = Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], spline: Some(DVec2::ZERO) };
 
 /// Difference, in 1/255, between camsim's samples and 8000 along the same straight path: RMS and largest over places and directions.
 fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
@@ -29,7 +29,8 @@ fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
         for place in 0..40 {
             let centre = DVec2::new(128.0, 128.0) + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
             let found = gather(&[centre - half, centre + half], &POINT, color, 2.0, 1024).x;
-            let exact = (0..8000).map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0)).x).sum::<f64>() / 8e3;
+            let exact =
+                (0..8000).map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0), DVec2::ZERO).x).sum::<f64>() / 8e3;
             let error = 255.0 * (found - exact).abs();
             square += error * error;
             worst = worst.max(error);
@@ -57,7 +58,7 @@ fn no_path_is_no_blur() {
     let color = ColorImage { size_px: [16, 16], rgba: &rgba };
     for at in [DVec2::new(7.0, 5.0), DVec2::new(7.3, 5.9), DVec2::new(-0.5, 15.5)] {
         let sharp = gather(&[at], &POINT, &color, 2.0, 256);
-        assert_eq!(sharp, color.spline(at));
+        assert_eq!(sharp, color.spline(at, DVec2::ZERO));
         for nodes in [2, 3, 65] {
             assert!((gather(&vec![at; nodes], &POINT, &color, 2.0, 256) - sharp).length() < 1e-12);
         }

@@ -10,7 +10,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, LinearFog, NEAR_M, RayStage, TemporalStage, table_shape},
     scenario::{Preset, Scenario},
     shutter::LinesAxis,
-    temporal::displacement::RK2_STEP_DEG,
+    temporal::{TapStage, displacement::RK2_STEP_DEG},
 };
 use glam::DMat3;
 
@@ -39,6 +39,25 @@ pub enum TemporalKind {
     Rk2,
 }
 
+/// What reads the ideal frame, without its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "as camsim_core::temporal::TapStage")]
+pub enum TapKind {
+    Bilinear,
+    Spline,
+    Grid,
+}
+
+impl From<TapStage> for TapKind {
+    fn from(stage: TapStage) -> Self {
+        match stage {
+            TapStage::Bilinear => Self::Bilinear,
+            TapStage::Spline => Self::Spline,
+            TapStage::Grid { .. } => Self::Grid,
+        }
+    }
+}
+
 /// Which stages a kernel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PipelineKey {
@@ -48,6 +67,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
+    /// What reads the ideal frame.
+    pub tap: TapKind,
     /// More than one ideal frame.
     pub keys: bool,
     /// Rays of their own at silhouettes.
@@ -73,6 +94,7 @@ impl PipelineKey {
             ray: plan.ray,
             temporal,
             blur: plan.blur.is_some(),
+            tap: plan.taps.into(),
             keys: plan.keys.len() > 1,
             edges: plan.edges != EdgeStage::None,
             truth: plan.truth,
@@ -98,14 +120,34 @@ impl PipelineKey {
                         if several && !parallax {
                             continue;
                         }
-                        keys.extend([false, true].map(|truth| Self { ray, temporal, blur, keys: several, edges, truth, paper: false }));
+                        for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
+                            keys.extend([false, true].map(|truth| Self {
+                                ray,
+                                temporal,
+                                blur,
+                                tap,
+                                keys: several,
+                                edges,
+                                truth,
+                                paper: false,
+                            }));
+                        }
                     }
                 }
             }
         }
         for ray in [RayStage::Pinhole, RayStage::GaussNewton] {
             for blur in [false, true] {
-                keys.extend([false, true].map(|truth| Self { ray, temporal: Rk2, blur, keys: false, edges: false, truth, paper: true }));
+                keys.extend([false, true].map(|truth| Self {
+                    ray,
+                    temporal: Rk2,
+                    blur,
+                    tap: TapKind::Bilinear,
+                    keys: false,
+                    edges: false,
+                    truth,
+                    paper: true,
+                }));
             }
         }
         keys
@@ -113,7 +155,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 8] {
+    pub fn slots(&self) -> [Slot; 9] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -132,6 +174,11 @@ impl PipelineKey {
             (true, false) => "reverse/gather/blur.wgsl",
             (true, true) => "reverse/gather/straight.wgsl",
         };
+        let tap = match self.tap {
+            TapKind::Bilinear => "reverse/gather/tap/bilinear.wgsl",
+            TapKind::Spline => "reverse/gather/tap/spline.wgsl",
+            TapKind::Grid => "reverse/gather/tap/grid.wgsl",
+        };
         let (depth, color) = match self.paper {
             false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
             true => ("reverse/depth/nearest.wgsl", "reverse/color/stored.wgsl"),
@@ -144,6 +191,7 @@ impl PipelineKey {
             ("depth", depth),
             ("temporal_inverse", temporal),
             ("gather", gather),
+            ("tap", tap),
             ("edges", edges),
             ("color", color),
             ("emit", emit),
@@ -351,7 +399,10 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         },
         samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px as f32),
         max_samples: plan.blur.map_or(1, |blur| blur.max_samples),
-        max_taps: plan.max_taps,
+        max_taps: match plan.taps {
+            TapStage::Grid { most } => most,
+            TapStage::Bilinear | TapStage::Spline => 1,
+        },
         coords_phase,
         light: photometric.light as f32,
         noise_sigma: photometric.noise_sigma as f32,
@@ -368,7 +419,6 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         keys: plan.keys.len() as u32,
         key_rows: key_rows(&plan.ideal),
         exposure_share: (plan.shutter.exposure_s() / (plan.window_s[1] - plan.window_s[0]).max(f64::MIN_POSITIVE)) as f32,
-        exposure_travel_px_m: plan.motion.exposure_travel_px_m as f32,
         rk2_step_rad: RK2_STEP_DEG.to_radians() as f32,
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
@@ -395,6 +445,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 96);
+        assert_eq!(PipelineKey::all().len(), 272);
     }
 }

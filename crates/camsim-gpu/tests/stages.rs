@@ -10,7 +10,7 @@ use camsim_core::{
     plan::{RayStage, TemporalStage, line_poses},
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, ZoomSpec},
     sequence::{GrayImage, Sequence},
-    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, gather, reproject},
+    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage, gather, reproject},
 };
 use common::{engine, pattern, render, scenario, sequence, steady};
 use glam::{DMat3, DVec2, DVec3};
@@ -57,7 +57,7 @@ fn render_with_ideal(sequence: &Arc<Sequence>, channels: &[Channel]) -> (camsim_
 }
 
 /// Lens map by central or one-sided differences, as the shader takes them.
-fn footprint(map: &[[f32; 2]], size_px: [u32; 2], [x, y]: [u32; 2], ideal: &IdealGeometry, max_taps: u32) -> Footprint {
+fn footprint(map: &[[f32; 2]], size_px: [u32; 2], [x, y]: [u32; 2], ideal: &IdealGeometry, taps: TapStage) -> Footprint {
     let at = |x: u32, y: u32| {
         let uv = map[(y * size_px[0] + x) as usize];
         (uv[0] < 1e29).then(|| DVec2::new(f64::from(uv[0]), f64::from(uv[1])))
@@ -73,7 +73,7 @@ fn footprint(map: &[[f32; 2]], size_px: [u32; 2], [x, y]: [u32; 2], ideal: &Idea
     let right = if x + 1 < size_px[0] { at(x + 1, y) } else { None };
     let up = if y > 0 { at(x, y - 1) } else { None };
     let down = if y + 1 < size_px[1] { at(x, y + 1) } else { None };
-    Footprint::new(difference(left, centre, right) * ideal.focal_px, difference(up, centre, down) * ideal.focal_px, max_taps)
+    Footprint::new(difference(left, centre, right) * ideal.focal_px, difference(up, centre, down) * ideal.focal_px, taps)
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             worst_px = worst_px.max(at_px.distance(DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]))));
             worst_depth = worst_depth.max((f64::from(depths[i]) * inverse_depth - 1.0).abs());
             let Some(nodes) = (0..blur.nodes).map(|node| solve(node).map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
-            let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.max_taps);
+            let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.taps);
             let expected = gather(&nodes, &area, &color, blur.samples_per_px, blur.max_samples);
             let found = DVec3::new(
                 f64::from(done.frame.color_rgba[4 * i]),

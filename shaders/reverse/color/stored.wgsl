@@ -5,7 +5,7 @@ fn after_gather(ray: Ray, color: vec3<f32>) -> vec3<f32> {
     if (frame.linear_fog.w == 0.0) {
         return color;
     }
-    let w = constant_depth(frame.ideal_focal_px * ray.uv + frame.ideal_principal_px).value;
+    let w = constant_depth(frame.ideal_focal_px * ray.uv + frame.ideal_principal_px);
     let amount = length(vec3<f32>(ray.uv, 1.0)) * frame.linear_fog.w / max(w, 1e-30);
     return mix(color, frame.linear_fog.rgb, clamp(amount, 0.0, 1.0));
 }

@@ -15,10 +15,10 @@ fn seen_from(at_px: vec2<f32>, in_line: f32, in_key: f32) -> Seen {
 // Where one surface is around, the solution of the temporal inverse stands, on the very path that `gather` samples.
 fn smooth_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
     let at_px = source_at_phase(pixel, ray, phase).at_px;
-    return reference_px(at_px, inverse_depth(at_px).value);
+    return reference_px(at_px, inverse_depth(at_px));
 }
 
 fn smooth_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
     let mid = temporal_inverse_with_depth(ray.uv, pose_mid(pixel));
-    return seen_from(mid.at_px, mid.inverse_depth, inverse_depth(mid.at_px).value);
+    return seen_from(mid.at_px, mid.inverse_depth, inverse_depth(mid.at_px));
 }

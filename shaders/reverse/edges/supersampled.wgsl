@@ -256,7 +256,7 @@ fn smooth_depth(uv: vec2<f32>, pose: Pose, met: f32) -> f32 {
     let px_per_w = distance(met_px, ideal_px_from_point(point_at(uv, pose, 0.0))) / max(met, 1e-12);
     var w = met;
     for (var i = 0u; i < 3u; i++) {
-        w = line_inverse_depth(uv, pose, inverse_depth(ideal_px_from_point(point_at(uv, pose, w))).value);
+        w = line_inverse_depth(uv, pose, inverse_depth(ideal_px_from_point(point_at(uv, pose, w))));
     }
     return select(met, w, abs(w - met) * px_per_w < SAME_PX);
 }

@@ -1,35 +1,23 @@
-// Area of an output pixel in the ideal frame: a grid of taps where the lens minifies.
+// Area of an output pixel in the ideal frame, and what reads it (the `tap` slot). Twin: camsim_core::temporal::Footprint.
 #import reverse/gather/interface.wgsl
 
 struct Footprint {
     // Ideal pixels per output pixel along x and y.
     dx: vec2<f32>,
     dy: vec2<f32>,
+    // Softness of the spline along x and y.
+    softness: vec2<f32>,
     taps: vec2<u32>,
 }
 
-fn footprint(ray: Ray) -> Footprint {
-    let dx = ray.d_dx * frame.ideal_focal_px;
-    let dy = ray.d_dy * frame.ideal_focal_px;
-    let wanted = vec2<u32>(ceil(vec2<f32>(length(dx), length(dy)) - 0.1));
-    return Footprint(dx, dy, clamp(wanted, vec2<u32>(1u), vec2<u32>(frame.max_taps)));
+#import <slot:tap>
+
+fn stretches(ray: Ray) -> vec2<f32> {
+    return vec2<f32>(length(ray.d_dx * frame.ideal_focal_px), length(ray.d_dy * frame.ideal_focal_px));
 }
 
-// Offset of tap i from the pixel centre, in ideal pixels; and in ideal rays for taps that need their own ray.
-fn tap_fraction(area: Footprint, i: u32) -> vec2<f32> {
-    let cell = vec2<f32>(f32(i % area.taps.x), f32((i / area.taps.x) % area.taps.y));
-    return (cell + 0.5) / vec2<f32>(area.taps) - 0.5;
-}
-
-fn tap_offset_px(area: Footprint, i: u32) -> vec2<f32> {
-    let f = tap_fraction(area, i);
-    return area.dx * f.x + area.dy * f.y;
-}
-
-// Colour of tap i around a source. A pixel that takes a single tap needs the better interpolation; several taps are an average anyway.
-fn tap_color(area: Footprint, source_px: vec2<f32>, i: u32) -> vec4<f32> {
-    if (area.taps.x * area.taps.y == 1u) {
-        return ideal_color_by_spline(source_px);
-    }
-    return ideal_color_at(source_px + tap_offset_px(area, i));
+// The variance of an area `p` ideal pixels wide is p^2 / 12 along that side; the ideal pixel itself has 1 / 12 of it, the spline adds
+// softness / 3.
+fn softness_of(stretch: vec2<f32>) -> vec2<f32> {
+    return clamp(0.25 * (stretch * stretch - 1.0), vec2<f32>(0.0), vec2<f32>(1.0));
 }

@@ -36,5 +36,5 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
 fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
     let ends = exposure_ends(pixel, ray);
     let at_px = mix(ends.first_px, ends.last_px, clamp(phase + 0.5, 0.0, 1.0));
-    return Source(at_px, 0.0, 0.0, ends.inside);
+    return Source(at_px, 0.0, ends.inside);
 }

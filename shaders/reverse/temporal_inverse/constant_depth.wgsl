@@ -32,8 +32,8 @@ fn image_rate(uv: vec2<f32>, w: f32) -> vec2<f32> {
 
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let found = constant_depth(frame.ideal_focal_px * uv + frame.ideal_principal_px);
-    let at_px = frame.ideal_focal_px * displaced(uv, found.value, pose.dt_s) + frame.ideal_principal_px;
-    return Source(at_px, found.value, found.spread, inside_ideal(at_px));
+    let at_px = frame.ideal_focal_px * displaced(uv, found, pose.dt_s) + frame.ideal_principal_px;
+    return Source(at_px, found, inside_ideal(at_px));
 }
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {

@@ -4,8 +4,6 @@ struct Source {
     at_px: vec2<f32>,
     // Inverse planar depth in the line's own camera, 1/m; 0 = sky.
     inverse_depth: f32,
-    // Spread of inverse depth around the source, 1/m.
-    spread: f32,
     // In front of the key camera and inside the ideal frame.
     inside: bool,
 }

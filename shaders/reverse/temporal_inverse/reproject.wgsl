@@ -10,19 +10,17 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let direction = rotate(pose, vec3<f32>(uv, 1.0));
     let shift = translation(pose);
     var w = 0.0;
-    var spread = 0.0;
     for (var i = 0u; i < frame.iterations; i++) {
         let found = inverse_depth(ideal_px_from_point(direction + w * shift));
-        spread = max(spread, found.spread);
-        let scale = 1.0 - shift.z * found.value;
+        let scale = 1.0 - shift.z * found;
         // The surface is at or behind the line's own image plane: keep the last guess.
         if (scale > 1e-3) {
-            w = found.value * direction.z / scale;
+            w = found * direction.z / scale;
         }
     }
     let in_key = direction + w * shift;
     let at_px = ideal_px_from_point(in_key);
-    return Source(at_px, w, spread, in_key.z > 0.0 && inside_ideal(at_px));
+    return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px));
 }
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {

@@ -63,6 +63,13 @@ impl LensReach {
         (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes })
     }
 
+    /// Ideal pixels for each of the camera's, at least: a lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory
+    /// is not worth it.
+    #[must_use]
+    pub fn least_scale(&self) -> f64 {
+        (1.0 / self.least_stretch).clamp(1.0, 2.0)
+    }
+
     /// Largest `sqrt(1 + u^2 + v^2)`: slant range over planar depth.
     #[must_use]
     pub fn slant(&self) -> f64 {
@@ -111,7 +118,8 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
 
 /// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
 /// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time. A `demanded` constant-twist solver
-/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth.
+/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth. `scale` is that of its focal length
+/// to the camera's.
 pub(super) fn ideal_geometry(
     reach: &LensReach,
     path: &CameraPath,
@@ -121,10 +129,10 @@ pub(super) fn ideal_geometry(
     keys: &[KeyFrame],
     surfaces: &Surfaces,
     demanded: Option<(TemporalStage, Twist)>,
+    scale: f64,
 ) -> IdealGeometry {
     let key = path.pose(key_s);
-    // A lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory is not worth it.
-    let focal_px = reach.camera.focal_px * (1.0 / reach.least_stretch).clamp(1.0, 2.0);
+    let focal_px = reach.camera.focal_px * scale;
     let (first, last) = shutter.window_s();
     let travel_m = super::travel_m(path, [stamp_s + first, stamp_s + last], key_s);
     let slant = reach.slant();

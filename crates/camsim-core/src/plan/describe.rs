@@ -5,7 +5,10 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{BlurStage, EdgeStage, FramePlan, Motion, Predicted, RayStage, Skip, TemporalStage};
-use crate::{scenario::Preset, temporal::displacement::RK2_STEP_DEG};
+use crate::{
+    scenario::Preset,
+    temporal::{TapStage, displacement::RK2_STEP_DEG},
+};
 
 /// The plan's figures, ready to serialise.
 #[derive(Clone, Debug, Serialize)]
@@ -42,8 +45,10 @@ pub struct PlanSummary<'a> {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
-    /// Most footprint taps an axis.
-    pub max_footprint_taps: u32,
+    /// What reads the ideal frame for each sample.
+    pub taps: TapStage,
+    /// Ideal pixels for each of the camera's.
+    pub ideal_scale: f64,
     /// Bounds behind the choices.
     pub motion: Motion,
     /// Bound on the displacement of the drawn terrain, ideal pixels.
@@ -103,8 +108,13 @@ impl FramePlan {
             Some(blur) if self.preset == Preset::Paper => format!("straight blur of {} samples, ends included", blur.max_samples),
             Some(blur) => format!("blur with {} nodes, {} samples a px", blur.nodes, blur.samples_per_px),
         };
+        let taps = match self.taps {
+            TapStage::Bilinear => "bilinear".to_owned(),
+            TapStage::Spline => "spline".to_owned(),
+            TapStage::Grid { most } => format!("spline, or up to {most}x{most} taps a pixel"),
+        };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
-        passes.push(format!("reverse: {ray} -> {temporal} -> {gather}{rays} -> photometric{truth}"));
+        passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}){rays} -> photometric{truth}"));
         passes.push("readback".to_owned());
         passes
     }
@@ -129,7 +139,8 @@ impl FramePlan {
             temporal: self.temporal,
             blur: self.blur,
             edges: self.edges,
-            max_footprint_taps: self.max_taps,
+            taps: self.taps,
+            ideal_scale: self.ideal.focal_px.x / self.camera.focal_px.x,
             motion: self.motion,
             terrain_error_px: self.terrain_error_px,
             predicted: &self.predicted,
@@ -165,8 +176,13 @@ impl Predicted {
         }
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples"
-        )
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples: {}",
+            if self.levels_kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" }
+        )?;
+        match &self.levels_in_the_way {
+            Some(cause) => writeln!(f, "  in the way: {cause}"),
+            None => Ok(()),
+        }
     }
 }
 

@@ -51,8 +51,6 @@ pub(super) struct Truth {
     pub inverse_depth: f64,
     /// The same of the key camera; 0 = sky.
     pub key_inverse_depth: f64,
-    /// What is seen: 0 = terrain, 1 + i = mesh i, `None` = sky.
-    pub surface: Option<usize>,
     /// The ray in the key camera, its z left as it is, and what an inverse depth of 1 adds to it.
     in_key: (DMat3, DVec3),
     direction: DVec3,
@@ -103,7 +101,6 @@ impl Trial<'_> {
             at_px,
             inverse_depth,
             key_inverse_depth: inverse_depth / point.z,
-            surface: met.map(|met| met.surface),
             in_key: (rotation, shift),
             direction,
             seen: self.surfaces.meet(self.key_pose.position_ned_m, self.key_ray(at_px)),

@@ -12,8 +12,7 @@ use serde::Serialize;
 use super::{
     BlurStage, EdgeStage, LensReach, Motion, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
-    grain::SceneGrain,
-    levels::Levels,
+    levels::Expected,
     probes::Probe,
     rounding::Rounding,
     surfaces::Surfaces,
@@ -55,10 +54,14 @@ pub struct Predicted {
     pub nodes_px: f64,
     /// Single precision of poses, depth and coordinates.
     pub format_px: f64,
-    /// Resampling: an estimate of its RMS over the picture, 1/255 of the linear range.
+    /// Resampling: what is expected of its RMS over the picture away from silhouettes, 1/255 of the linear range.
     pub resampling_dn: f64,
     /// The same of too few samples over the exposure.
     pub blur_dn: f64,
+    /// Whether the two are within `quality.max_error_dn`.
+    pub levels_kept: bool,
+    /// If not: what is in the way.
+    pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
     /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose.
@@ -83,9 +86,9 @@ pub(super) struct Case<'a> {
     pub key_twist: Twist,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
-    pub max_taps: u32,
-    pub grain: &'a SceneGrain,
     pub surfaces: &'a Surfaces,
+    pub expected: Expected,
+    pub levels_in_the_way: Option<String>,
 }
 
 /// What was chosen, and what it leads to.
@@ -230,7 +233,7 @@ impl Forecast<'_> {
         let (blur, max_error_px) = (case.blur, case.sequence.scenario.quality.max_error_px);
         let nodes_px = self.nodes_px(blur);
         let total_px = self.total_px(stage) + nodes_px;
-        let [resampling_dn, blur_dn] = self.levels_dn(case);
+        let Expected { resampling_dn, blur_dn } = case.expected;
         let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
         let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
         let temporal_px = SAFETY * self.largest(|_, run| unsettled_px(run, stage));
@@ -258,25 +261,14 @@ impl Forecast<'_> {
             format_px,
             resampling_dn,
             blur_dn,
+            levels_kept: case.levels_in_the_way.is_none(),
+            levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,
             silhouette_share: apart as f64 / f64::from(probes.max(1)),
             probes,
             kept,
             in_the_way: largest.map(|(px, what)| format!("{what}: {px:.2e} px")),
         }
-    }
-
-    /// Estimates of what resampling and blur samples cost.
-    fn levels_dn(&self, case: &Case<'_>) -> [f64; 2] {
-        let (mut sums, mut count) = ([0.0; 2], 0.0);
-        let trial = &self.truths.trial;
-        for Looked { probe, truth, .. } in &self.truths.looked {
-            let ends_px = [0.0, 1.0].map(|share| if case.blur.is_some() { trial.source_px(probe, truth, share) } else { truth.at_px });
-            let levels = Levels::new(probe, truth, ends_px, trial.ideal, case.grain, case.max_taps, case.blur);
-            sums = [sums[0] + levels.resampling, sums[1] + levels.blur];
-            count += 1.0;
-        }
-        sums.map(|sum| 255.0 * (sum / f64::max(count, 1.0)).sqrt())
     }
 
     fn rounding(&self, Looked { probe, truth, .. }: &Looked, run: &Outcome, stage: TemporalStage) -> Rounding {

@@ -1,82 +1,319 @@
-//! What resampling and the samples of the exposure cost in grey levels: an estimate from how much the pictures in view change from pixel
-//! to pixel. Not a bound: against the oracle's own pictures it is 0.6 (a pattern of hard edges) to 2.2 times (a fisheye over an alpine
-//! valley) the error measured away from silhouettes (`camsim verify --pictures` shows both).
+//! What resampling and the samples of the exposure cost in grey levels, and the cheapest of them that keep `quality.max_error_dn`.
+//!
+//! At a few places of the image the surface in view, its texture's power spectrum (`grain.rs`) and the two maps from the texture over the
+//! ideal frame to the output pixel are known. What each stage leaves of a wave of the texture has a closed form (`transfer.rs`): the filter
+//! of the ideal frame's surfaces, the reads between its pixels with what they alias, the grid of reads, the samples over the exposure. The
+//! exact pixel is the mean over its area and over the exposure. The squared difference of the two, weighed by the spectrum, is the
+//! expected squared error. Not a bound: textures are taken to be as grainy everywhere and in all directions, and silhouettes are not in it.
+//! Measured against the oracle's pictures away from silhouettes: docs/ACCURACY.md.
 
 use glam::{DMat2, DVec2};
+use rayon::prelude::*;
 
-use super::{BlurStage, dry_run::Truth, grain::SceneGrain, probes::Probe};
-use crate::temporal::{Footprint, IdealGeometry, samples_for};
+use super::{
+    BlurStage, LensReach,
+    grain::{SceneGrain, Spectrum},
+    probes::Probe,
+    surfaces::Surfaces,
+    transfer::{Path, SurfaceFilter, error2},
+};
+use crate::{
+    mount::CameraPath,
+    photometric::vignette_weight,
+    pose::CameraPose,
+    scenario::{Auto, Preset, QualitySpec},
+    sequence::Sequence,
+    shutter::Shutter,
+    temporal::{Footprint, TapStage, samples_for},
+};
 
-/// RMS error of one bilinear tap of an ideal frame, in RMS steps between its pixels.
-const TAP: f64 = 0.25;
-/// Samples a pixel of path, and the RMS error of their mean over a path of one pixel, of the RMS step; it falls with the root of the path
-/// (white texture, paths of 16 and 64 px).
-const SAMPLING: [(f64, f64); 4] = [(0.25, 0.73), (0.5, 0.33), (1.0, 0.034), (2.0, 0.0096)];
+/// Probes that are looked at, at most.
+const SIGHTS: usize = 20;
+/// Times what is expected: textures are not equally grainy everywhere.
+const SAFETY: f64 = 1.15;
+/// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
+const FORMAT_DN: f64 = 0.12;
+/// Scales of the ideal frame that are tried, of the camera's.
+const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, 2.0];
+/// Samples a pixel of path that are tried.
+const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Most samples between two nodes.
+const MAX_SAMPLES: u32 = 512;
+/// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
+const MOST_TAPS: u32 = 4;
+/// Costs beside one bilinear read of an output pixel: an ideal pixel, and a read of the spline. Measured on llvmpipe.
+const IDEAL_COST: f64 = 20.0;
+const SPLINE_COST: f64 = 6.0;
+/// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
+const FOG_AT_VISIBILITY: f64 = 3.912;
 
-/// Squared errors of one pixel, of the linear range.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Levels {
-    pub resampling: f64,
-    pub blur: f64,
+/// What is expected of one way of sampling, RMS over the picture, 1/255 of the linear range.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Expected {
+    pub resampling_dn: f64,
+    pub blur_dn: f64,
 }
 
-impl Levels {
-    /// At a probe whose source runs from `ends[0]` to `ends[1]` within the exposure.
+impl Expected {
+    pub fn total_dn(self) -> f64 {
+        self.resampling_dn.hypot(self.blur_dn)
+    }
+}
+
+/// A way of sampling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sampling {
+    /// Ideal pixels for each of the camera's.
+    pub scale: f64,
+    pub taps: TapStage,
+    pub samples_per_px: f64,
+    pub expected: Expected,
+}
+
+/// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
+struct Sight<'a> {
+    spectrum: &'a Spectrum,
+    /// Of the linear range, for each unit of texture.
+    gain: f64,
+    /// d(camera px)/d(output px) and d(texel)/d(camera px).
+    camera_from_px: DMat2,
+    texel_from_camera: DMat2,
+    /// Source in the key frame from its principal point, and path over the exposure, camera px.
+    key_px: DVec2,
+    path: DVec2,
+    path_px: f64,
+}
+
+/// The places of a frame.
+pub(super) struct Prospect<'a> {
+    sights: Vec<Sight<'a>>,
+    /// Places looked at: those without a texture count, as without error.
+    looked_at: usize,
+    /// Of the camera, and but for whole pixels of every ideal frame.
+    principal_px: DVec2,
+    /// Widest output pixel, camera px.
+    widest: f64,
+}
+
+impl<'a> Prospect<'a> {
     pub fn new(
-        probe: &Probe,
-        truth: &Truth,
-        ends_px: [DVec2; 2],
-        ideal: &IdealGeometry,
-        grain: &SceneGrain,
-        max_taps: u32,
-        blur: Option<BlurStage>,
+        reach: &LensReach,
+        sequence: &Sequence,
+        surfaces: &Surfaces,
+        grain: &'a SceneGrain,
+        shutter: &Shutter,
+        stamp_s: f64,
+        key_pose: &CameraPose,
     ) -> Self {
-        let Some(surface) = truth.surface else { return Self::default() };
-        let px_m = 1.0 / (truth.key_inverse_depth * ideal.focal_px.x.min(ideal.focal_px.y));
-        let step = grain.step(surface, px_m);
-        let ideal_from_px = DMat2::from_diagonal(ideal.focal_px) * probe.uv_from_px;
-        let area = Footprint::new(ideal_from_px.x_axis, ideal_from_px.y_axis, max_taps);
-        let taps = f64::from(area.taps[0] * area.taps[1]);
-        // Fewer taps than pixels: what lies between is seen or not by chance.
-        let thin = (area.dx.length() / f64::from(area.taps[0])).max(1.0) * (area.dy.length() / f64::from(area.taps[1])).max(1.0);
-        let tap = TAP * step * thin / taps.sqrt();
-        let path_px = ends_px[0].distance(ends_px[1]);
-        let sampling = blur.filter(|_| path_px > 1.0).map_or(0.0, |blur| {
-            let segments = f64::from(blur.nodes - 1);
-            let samples = segments * f64::from(samples_for(path_px / segments, blur.samples_per_px, 1, blur.max_samples));
-            step * sampling(samples / path_px) / path_px.sqrt()
+        let (probes, focal_px) = (&reach.probes, reach.camera.focal_px);
+        let every = probes.len().div_ceil(SIGHTS).max(1);
+        let photometric = &sequence.scenario.camera.photometric;
+        let weight = |[x, y]: [u32; 2]| {
+            let Some(map) = &sequence.vignette else { return 1.0 };
+            let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / reach.camera.size_px[k]) as usize);
+            f64::from(vignette_weight(map.values[row * map.size_px[0] as usize + column], photometric.vignette_thresholds))
+        };
+        let looked_at: Vec<&Probe> = probes.iter().skip(every / 2).step_by(every).collect();
+        let sight = |probe: &&Probe| {
+            let [x, y] = probe.pixel;
+            let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
+            let pose = sequence.path.pose(mid_s);
+            let shown = Shown::new(surfaces, &pose, probe.uv, focal_px)?;
+            let (rotation, shift) = pose.relative_to(key_pose);
+            let in_key = rotation * probe.uv.extend(1.0) + shown.inverse_depth * shift;
+            let path = path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
+            let clear =
+                sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
+            Some(Sight {
+                spectrum: grain.of(shown.surface)?,
+                gain: weight(probe.pixel) * photometric.light * clear,
+                key_px: focal_px * in_key.truncate() / in_key.z,
+                camera_from_px: DMat2::from_diagonal(focal_px) * probe.uv_from_px,
+                texel_from_camera: shown.texel_from_camera,
+                path: path.0,
+                path_px: path.1,
+            })
+        };
+        let sights = looked_at.par_iter().filter_map(sight).collect();
+        let widest = probes.iter().map(|probe| {
+            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
+            sides.x_axis.length().max(sides.y_axis.length())
         });
-        // A long path averages what each tap is off by.
-        let averaged = if blur.is_some() { path_px.max(1.0) } else { 1.0 };
-        Self { resampling: tap * tap / averaged, blur: sampling * sampling }
+        let widest = widest.fold(0.0, f64::max);
+        Self { sights, looked_at: looked_at.len(), principal_px: reach.camera.principal_point_px, widest }
+    }
+
+    /// What is to be expected of a way of sampling.
+    pub fn expect(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
+        let [exact, sampled] = self.squares(scale, taps, blur);
+        Expected { resampling_dn: dn(exact), blur_dn: SAFETY * 255.0 * (sampled - exact).max(0.0).sqrt() }
+    }
+
+    /// Mean squared errors with the exposure exact, and with its samples.
+    fn squares(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> [f64; 2] {
+        let of = |sight: &Sight<'_>| {
+            let sides = scale * sight.camera_from_px;
+            let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
+            let filter = SurfaceFilter::new(sight.texel_from_camera * scale.recip());
+            let samples = blur.map(|BlurStage { nodes, samples_per_px, max_samples }| {
+                let segments = nodes - 1;
+                let at_least = (area.taps[0] * area.taps[1]).div_ceil(segments);
+                segments * samples_for(scale * sight.path_px / f64::from(segments), samples_per_px, at_least, max_samples)
+            });
+            let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
+            let path = samples.map(|samples| Path { along: scale * sight.path, samples });
+            let error = error2(sight.spectrum, &filter, sides, &area, path, beside_px);
+            error.map(|square| sight.gain * sight.gain * square)
+        };
+        let sums = self.sights.par_iter().map(of).reduce(|| [0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        sums.map(|sum| sum / self.looked_at.max(1) as f64)
+    }
+
+    /// The cheapest sampling within the tolerance, or the best there is. The scale is not below `least_scale`, and that at which the
+    /// frame does not fit is left out.
+    pub fn choose(&self, quality: &QualitySpec, least_scale: f64, nodes: u32, fits: impl Fn(f64) -> bool) -> Sampling {
+        let forced = quality.ideal_scale.value();
+        let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && fits(scale));
+        let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
+        let mut ways: Vec<(f64, f64, TapStage)> = scales
+            .iter()
+            .flat_map(|&scale| self.stages(quality, scale).into_iter().map(move |taps| (scale, taps)))
+            .map(|(scale, taps)| (self.cost(scale, taps, nodes), scale, taps))
+            .collect();
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let tolerance_dn = quality.max_error_dn;
+        let per_px = |scale: f64| match quality.blur_samples.value() {
+            Some(samples) => vec![f64::from(samples)],
+            None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
+        };
+        let mut best: Option<Sampling> = None;
+        for (_, scale, taps) in ways {
+            // The most samples first: if those do not do, fewer need not be tried.
+            let choices = if nodes > 1 { per_px(scale) } else { vec![0.0] };
+            let expect = |samples_per_px: f64| {
+                let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
+                let blur = (nodes > 1).then_some(BlurStage { nodes, samples_per_px, max_samples });
+                Sampling { scale, taps, samples_per_px, expected: self.expect(scale, taps, blur) }
+            };
+            let Some(most) = choices.last().map(|&samples| expect(samples)) else { continue };
+            if most.expected.total_dn() > tolerance_dn {
+                if best.is_none_or(|best| most.expected.total_dn() < 0.95 * best.expected.total_dn()) {
+                    best = Some(most);
+                }
+                continue;
+            }
+            let fewer = choices[..choices.len() - 1].iter().map(|&samples| expect(samples));
+            return { fewer }.find(|way| way.expected.total_dn() <= tolerance_dn).unwrap_or(most);
+        }
+        best.unwrap_or(Sampling { scale: least_scale, taps: TapStage::Spline, samples_per_px: 2.0, expected: Expected::default() })
+    }
+
+    /// Ways of reading the ideal frame at a scale.
+    fn stages(&self, quality: &QualitySpec, scale: f64) -> Vec<TapStage> {
+        let widest = scale * self.widest;
+        let most = |cap: u32| if widest > 3_f64.sqrt() { TapStage::Grid { most: cap.min(widest.ceil() as u32) } } else { TapStage::Spline };
+        match quality.footprint_taps.value() {
+            Some(1) => vec![TapStage::Spline],
+            Some(taps) => vec![most(taps)],
+            None => vec![TapStage::Bilinear, TapStage::Spline, most(MOST_TAPS)],
+        }
+    }
+
+    /// Time of a way, in bilinear reads of an output pixel.
+    fn cost(&self, scale: f64, taps: TapStage, nodes: u32) -> f64 {
+        let of = |sight: &Sight<'_>| {
+            let sides = scale * sight.camera_from_px;
+            let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
+            let reads = if nodes > 1 {
+                (2.0 * sight.path_px).max(f64::from(area.taps[0] * area.taps[1]))
+            } else {
+                f64::from(area.taps[0] * area.taps[1])
+            };
+            reads * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
+        };
+        let reads = self.sights.iter().map(of).sum::<f64>() / self.sights.len().max(1) as f64;
+        scale * scale * IDEAL_COST + reads
     }
 }
 
-/// Between the rows of the table along straight lines of the logarithms; beyond its ends as at them, or falling on.
-fn sampling(samples_per_px: f64) -> f64 {
-    let last = SAMPLING[SAMPLING.len() - 1];
-    if samples_per_px >= last.0 {
-        return last.1 * last.0 / samples_per_px;
+fn dn(square: f64) -> f64 {
+    (SAFETY * 255.0 * square.sqrt()).hypot(FORMAT_DN)
+}
+
+/// What a ray shows of a texture.
+struct Shown {
+    surface: usize,
+    inverse_depth: f64,
+    range_m: f64,
+    texel_from_camera: DMat2,
+}
+
+impl Shown {
+    /// By the ray itself and two beside it; `None` for the sky, a texture of one colour, and where the three meet different surfaces.
+    fn new(surfaces: &Surfaces, pose: &CameraPose, uv: DVec2, focal_px: DVec2) -> Option<Self> {
+        const BESIDE_PX: f64 = 0.5;
+        let look = |offset_px: DVec2| surfaces.meet(pose.position_ned_m, pose.ned_from_camera * (uv + offset_px / focal_px).extend(1.0));
+        let here = look(DVec2::ZERO)?;
+        let beside = [DVec2::X, DVec2::Y].map(|axis| look(BESIDE_PX * axis).filter(|beside| beside.surface == here.surface));
+        let [x, y] = [beside[0].as_ref()?, beside[1].as_ref()?];
+        let texel_from_camera =
+            DMat2::from_cols(surfaces.texel(x) - surfaces.texel(&here), surfaces.texel(y) - surfaces.texel(&here)) * BESIDE_PX.recip();
+        (texel_from_camera.determinant().abs() > 1e-12).then_some(Self {
+            surface: here.surface,
+            inverse_depth: here.depth_m.recip(),
+            range_m: here.depth_m * uv.extend(1.0).length(),
+            texel_from_camera,
+        })
     }
-    let between = SAMPLING.windows(2).find(|pair| samples_per_px < pair[1].0 && samples_per_px >= pair[0].0);
-    between.map_or(SAMPLING[0].1, |pair| {
-        let share = (samples_per_px / pair[0].0).ln() / (pair[1].0 / pair[0].0).ln();
-        pair[0].1 * (pair[1].1 / pair[0].1).powf(share)
+}
+
+/// Path of the source over the exposure, camera px: from end to end, and its length.
+fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_depth: f64, focal_px: DVec2) -> (DVec2, f64) {
+    const STRETCHES: u32 = 8;
+    if exposure_s <= 0.0 {
+        return (DVec2::ZERO, 0.0);
+    }
+    let mid = path.pose(mid_s);
+    let place = |k: u32| {
+        let t_s = mid_s + exposure_s * (f64::from(k) / f64::from(STRETCHES) - 0.5);
+        let (rotation, shift) = path.pose(t_s).relative_to(&mid);
+        let p = rotation * uv.extend(1.0) + inverse_depth * shift;
+        focal_px * p.truncate() / p.z
+    };
+    let places: Vec<DVec2> = (0..=STRETCHES).map(place).filter(|at| at.is_finite()).collect();
+    let length_px = places.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+    let first = places.first().copied().unwrap_or_default();
+    let farthest = places.iter().map(|at| *at - first).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+    (farthest.unwrap_or_default(), length_px)
+}
+
+/// Why the tolerance is not kept; `None` if it is.
+pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected) -> Option<String> {
+    if quality.preset == Preset::Paper || expected.total_dn() <= quality.max_error_dn {
+        return None;
+    }
+    let Expected { resampling_dn, blur_dn } = expected;
+    Some(match (blur_dn > resampling_dn, quality.blur_samples, quality.footprint_taps, quality.ideal_scale) {
+        (true, Auto::Value(_), ..) => format!("quality.blur_samples: {blur_dn:.2}/255"),
+        (true, ..) => format!("samples over the exposure: {blur_dn:.2}/255"),
+        (false, _, Auto::Value(_), _) => format!("quality.footprint_taps: {resampling_dn:.2}/255"),
+        (false, _, _, Auto::Value(_)) => format!("quality.ideal_scale: {resampling_dn:.2}/255"),
+        _ => format!("detail finer than an ideal frame of {:.2} times the camera's scale holds: {resampling_dn:.2}/255", sampling.scale),
     })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+impl Sampling {
+    /// The paper's: one bilinear read a sample.
+    pub fn of_paper() -> Self {
+        Self { scale: 1.0, taps: TapStage::Bilinear, samples_per_px: 0.0, expected: Expected::default() }
+    }
 
-    #[test]
-    fn more_samples_are_never_worse() {
-        let mut before = f64::INFINITY;
-        for k in 1..60 {
-            let found = sampling(0.1 * f64::from(k));
-            assert!(found <= before && found > 0.0);
-            before = found;
-        }
-        assert!((sampling(1.0) - 0.034).abs() < 1e-12 && (sampling(0.5) - 0.33).abs() < 1e-12);
+    /// The exposure's samples between so many nodes, for paths of up to `blur_px` ideal pixels.
+    pub fn blur_stage(&self, nodes: u32, quality: &QualitySpec, blur_px: f64) -> BlurStage {
+        let (samples_per_px, max_samples) = match quality.blur_samples.value() {
+            Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
+            None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, MAX_SAMPLES)),
+        };
+        BlurStage { nodes, samples_per_px, max_samples }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{BlurStage, LensReach, Motion, Skip, TemporalStage, surfaces::Surfaces};
+use super::{LensReach, Motion, Skip, TemporalStage, surfaces::Surfaces};
 use crate::{mount::CameraPath, scenario::QualitySpec, shutter::Shutter, temporal::IdealGeometry};
 
 /// Part of the tolerance that a left-out effect may use up.
@@ -39,7 +39,6 @@ pub(super) fn measure(
     let slant = reach.slant();
     let focal_px = ideal.focal_px.max_element();
     let (blur_px, blur_sagitta_px) = blur_path(reach, path, shutter, stamp_s, ideal, 1.0 / nearest_m);
-    let speed_m_s = instants(path, window_s).map(|t| path.velocity_ned(t).length()).fold(0.0, f64::max);
     Motion {
         nearest_m,
         travel_m,
@@ -49,7 +48,6 @@ pub(super) fn measure(
         rotation_px: focal_px * rotation_rad * slant * slant,
         blur_px,
         blur_sagitta_px,
-        exposure_travel_px_m: focal_px * speed_m_s * shutter.exposure_s() * slant,
     }
 }
 
@@ -142,8 +140,8 @@ pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut
     }
 }
 
-/// Nodes and samples of the exposure, or `None` when it does not show.
-pub(super) fn blur_stage(
+/// Nodes of the exposure, or `None` when it does not show.
+pub(super) fn exposure_nodes(
     motion: &Motion,
     quality: &QualitySpec,
     reach: &LensReach,
@@ -152,7 +150,7 @@ pub(super) fn blur_stage(
     stamp_s: f64,
     ideal: &IdealGeometry,
     skipped: &mut Vec<Skip>,
-) -> Option<BlurStage> {
+) -> Option<u32> {
     if shutter.exposure_s() <= 0.0 {
         skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
         return None;
@@ -175,14 +173,5 @@ pub(super) fn blur_stage(
         }
         segments = (segments * (1.05 * miss_px / allowed_px).sqrt()).ceil().min(most);
     }
-    Some(samples_between(segments as u32 + 1, quality, motion))
-}
-
-/// Samples of an exposure of so many nodes.
-pub(super) fn samples_between(nodes: u32, quality: &QualitySpec, motion: &Motion) -> BlurStage {
-    let (samples_per_px, max_samples) = match quality.blur_samples.value() {
-        Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
-        None => (2.0, ((2.0 * motion.blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, 512)),
-    };
-    BlurStage { nodes, samples_per_px, max_samples }
+    Some(segments as u32 + 1)
 }

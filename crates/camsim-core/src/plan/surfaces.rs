@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::NEAR_M;
 use crate::{
@@ -26,6 +26,8 @@ pub(super) struct Met {
     pub depth_m: f64,
     /// 0 = terrain, 1 + i = mesh i.
     pub surface: usize,
+    /// Texture coordinates there.
+    pub uv: [f64; 2],
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
 }
@@ -54,11 +56,22 @@ impl Surfaces {
         let triangle = |triangle: u32, limit: f64| {
             let (mesh, first) = self.triangles[triangle as usize];
             let points = corners(&self.scene.meshes[mesh as usize], first);
-            intersect_triangle(points, origin_ned_m, direction_ned, limit).map(|(t, _)| (t, 1 + mesh as usize))
+            intersect_triangle(points, origin_ned_m, direction_ned, limit).map(|(t, weights)| (t, (mesh as usize, first, weights)))
         };
         let of_mesh = self.tree.first(origin_ned_m, direction_ned, limit, triangle);
-        let on_mesh = of_mesh.map(|(depth_m, surface)| Met { depth_m, surface, terrain: None });
-        on_mesh.or(ground.map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) }))
+        let on_mesh = of_mesh.map(|(depth_m, (mesh, first, weights))| {
+            let uv_of = |k: usize| self.scene.meshes[mesh].vertices[self.scene.meshes[mesh].indices[first as usize + k] as usize].uv;
+            let uv = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(uv_of(k)[axis])).sum());
+            Met { depth_m, surface: 1 + mesh, uv, terrain: None }
+        });
+        on_mesh.or(ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, terrain: Some(hit) }))
+    }
+
+    /// Place in the picture on what a ray met, texels.
+    pub fn texel(&self, met: &Met) -> DVec2 {
+        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &mesh.texture);
+        let texture = of_mesh.or(self.terrain().map(|terrain| &terrain.texture));
+        texture.map_or(DVec2::ZERO, |texture| DVec2::from_array(met.uv) * DVec2::from_array(texture.size_px.map(f64::from)))
     }
 
     /// Lower bound of the planar depth of anything in view from within `travel_m` of `pose`, metres; infinite with nothing in view.

@@ -215,6 +215,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     );
     check.at_least_one("quality.blur_samples", quality.blur_samples);
     check.at_least_one("quality.footprint_taps", quality.footprint_taps);
+    check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=4.0).contains(&scale)), "quality.ideal_scale", || {
+        "must be 1 to 4 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
+    });
     check.require(quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)), "quality.key_frames", || {
         format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\"")
     });
@@ -238,6 +241,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
         "does not go with quality.preset = \"paper\", which looks the depth up once; leave it out".into()
     });
     check.require(matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)), "quality.key_frames", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
+    check.require(quality.ideal_scale == Auto::Auto, "quality.ideal_scale", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
     check.require(matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)), "quality.footprint_taps", || {
@@ -347,6 +353,7 @@ mod tests {
             }),
             ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
+            ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(0.5)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),
             ("quality.iterations", |s| {
                 s.quality.iterations = Auto::Value(2);

@@ -121,6 +121,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.iterations", WholeOr(AUTO)),
     ("quality.blur_samples", WholeOr(AUTO)),
     ("quality.footprint_taps", WholeOr(AUTO)),
+    ("quality.ideal_scale", NumberOr(AUTO)),
     ("quality.key_frames", WholeOr(AUTO)),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),

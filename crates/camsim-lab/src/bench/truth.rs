@@ -46,6 +46,8 @@ pub struct Errors {
     pub psnr_db: Option<f64>,
     /// Within 3 px of silhouettes; `None` without any.
     pub edge_psnr_db: Option<f64>,
+    /// RMS of the picture away from silhouettes, 1/255 of the linear range: what the plan's levels predict.
+    pub smooth_dn: Option<f64>,
     /// Pixels behind the two.
     pub pictured: u64,
     /// The plan's own bound.
@@ -91,6 +93,7 @@ impl Truth {
             coords: self.coords.errors(&plan, &frame, 1),
             psnr_db: psnr_db(share[0] * mean(0) + share[1] * mean(1)),
             edge_psnr_db: psnr_db(mean(1)),
+            smooth_dn: (squares[0].1 > 0).then(|| 255.0 * mean(0).sqrt()),
             pictured: squares[0].1 + squares[1].1,
             predicted_px: Some(plan.predicted.total_px),
             passes: plan.passes(),

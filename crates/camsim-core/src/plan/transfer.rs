@@ -1,0 +1,190 @@
+//! What the stages between a texture and a pixel leave of a wave: transfer functions.
+//!
+//! Frequencies `f` are cycles an ideal pixel, `nu` cycles a texel; `sinc(x) = sin(pi x) / (pi x)`.
+//!
+//! | stage | leaves |
+//! |---|---|
+//! | texture, bilinear between texels | `sinc^2(nu_x) sinc^2(nu_y)` |
+//! | surface filter, a grid of reads of a smaller version | mean over the grid, times what a version of 2^m texels has |
+//! | bilinear read between ideal pixels | `sinc^2(f_x) sinc^2(f_y)`, and as much of `f + k` for whole `k` |
+//! | spline | that of Catmull and Rom's kernel and of the B-spline, mixed by softness; the same aliases |
+//! | grid of reads, samples on a path | `sin(pi n x) / (n sin(pi x))` of the step along each |
+//! | exact: mean over the pixel's sides and the path | `sinc` of each |
+
+use std::f64::consts::{LN_2, PI};
+
+use glam::{DMat2, DVec2};
+
+use super::grain::{Spectrum, mean_of};
+use crate::temporal::Footprint;
+
+/// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
+const LOWEST: f64 = 0.031_25;
+const OCTAVES: u32 = 7;
+const AN_OCTAVE: u32 = 2;
+const DIRECTIONS: u32 = 6;
+/// Cycles a texel above which a bilinear texture has no more to show.
+const MOST_CYCLES: f64 = 1.5;
+/// As in shaders/ideal/surface.wgsl.
+const MAX_TAPS: f64 = 32.0;
+const SHORT_TAPS: f64 = 2.0;
+const ONE_TAP: f64 = 0.5;
+
+pub(super) fn sinc(x: f64) -> f64 {
+    let x = PI * x;
+    if x.abs() < 1e-6 { 1.0 } else { x.sin() / x }
+}
+
+/// Catmull and Rom's kernel: the transform of Keys's cubic convolution with a = -1/2 (1981).
+fn catmull_rom(f: f64) -> f64 {
+    if f.abs() < 0.02 {
+        return 1.0;
+    }
+    let (one, two) = (sinc(f), sinc(2.0 * f));
+    (3.0 * (one * one - two) - (3.0 * two * two - 2.0 * two - sinc(4.0 * f))) / (PI * f).powi(2)
+}
+
+/// A read of the ideal frame along one axis; softness as of [`Footprint::spline`], `None` is bilinear.
+fn read(softness: Option<f64>, f: f64) -> f64 {
+    match softness {
+        None => sinc(f).powi(2),
+        Some(soft) if soft > 0.0 => (1.0 - soft) * catmull_rom(f) + soft * sinc(f).powi(4),
+        Some(_) => catmull_rom(f),
+    }
+}
+
+/// `n` samples evenly over a stretch of `x` cycles.
+fn evenly(n: u32, x: f64) -> f64 {
+    mean_of(n, x / f64::from(n))
+}
+
+/// The filter of the ideal frame's surfaces. Twin of `picture_at` in shaders/ideal/surface.wgsl.
+pub(super) struct SurfaceFilter {
+    /// d(texel)/d(ideal px), and what takes a frequency from cycles an ideal pixel to cycles a texel.
+    texel_from_ideal: DMat2,
+    texel_cycles: DMat2,
+    /// Sides of the grid of reads, texels, and its reads.
+    sides: [DVec2; 2],
+    taps: [u32; 2],
+    level: f64,
+}
+
+impl SurfaceFilter {
+    pub fn new(texel_from_ideal: DMat2) -> Self {
+        let DMat2 { x_axis: dx, y_axis: dy } = texel_from_ideal;
+        let [a, b, c] = [dx.x * dx.x + dy.x * dy.x, dx.x * dx.y + dy.x * dy.y, dx.y * dx.y + dy.y * dy.y];
+        let mean = 0.5 * (a + c);
+        let spread = (0.25 * (a - c) * (a - c) + b * b).sqrt();
+        let (longer, shorter) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
+        let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };
+        let covered = (shorter / short_taps).max(1.0);
+        let long_taps = (longer / covered - 0.1).ceil().clamp(short_taps, MAX_TAPS);
+        let along = if spread > 1e-6 * mean {
+            let both = if a >= c { DVec2::new(0.5 * (a - c) + spread, b) } else { DVec2::new(b, 0.5 * (c - a) + spread) };
+            both.normalize_or(DVec2::X)
+        } else {
+            DVec2::X
+        };
+        let level = (longer / long_taps).max(covered).log2();
+        let (below, share) = (level.floor(), level.fract());
+        let version = 3.0 * ((2.0 * below).exp2() * (1.0 + 3.0 * share) - 1.0);
+        let length = |side: f64, taps: f64| ((side * side - version).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt();
+        Self {
+            texel_from_ideal,
+            texel_cycles: texel_from_ideal.inverse().transpose(),
+            sides: [along * length(longer, long_taps), along.perp() * length(shorter, short_taps)],
+            taps: [long_taps as u32, short_taps as u32],
+            level,
+        }
+    }
+
+    /// What is left of a wave beyond what the texture itself has.
+    fn leaves(&self, cycles: DVec2) -> f64 {
+        let grid: f64 = (0..2).map(|k| evenly(self.taps[k], self.sides[k].dot(cycles))).product();
+        let below = self.level.floor();
+        let version = |level: f64| {
+            let texels = level.exp2();
+            let axis = |nu: f64| {
+                let own = sinc(nu);
+                if texels < 1.5 || own.abs() < 1e-3 { 1.0 } else { mean_of(texels as u32, nu) * (sinc(texels * nu) / own).powi(2) }
+            };
+            axis(cycles.x) * axis(cycles.y)
+        };
+        let share = self.level - below;
+        grid * ((1.0 - share) * version(below) + if share > 0.0 { share * version(below + 1.0) } else { 0.0 })
+    }
+}
+
+/// The exposure: its path, ideal pixels, and the samples on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Path {
+    pub along: DVec2,
+    pub samples: u32,
+}
+
+/// A complex number: what is left of a wave, and how far it is shifted.
+type Wave = DVec2;
+
+/// The samples of an exposure, each at its place on the path and at one of the taps in turn.
+fn sampled(area: &Footprint, path: Path, f: DVec2) -> Wave {
+    let taps = area.taps[0] * area.taps[1];
+    if taps == 1 || path.samples > 8 * taps {
+        return Wave::new(grid(area, f) * evenly(path.samples, path.along.dot(f)), 0.0);
+    }
+    let at = |i: u32| area.offset_px(i) + path.along * ((f64::from(i) + 0.5) / f64::from(path.samples) - 0.5);
+    (0..path.samples).map(|i| Wave::from_angle(2.0 * PI * f.dot(at(i)))).sum::<Wave>() / f64::from(path.samples)
+}
+
+/// The grid of taps.
+fn grid(area: &Footprint, f: DVec2) -> f64 {
+    evenly(area.taps[0], area.dx.dot(f)) * evenly(area.taps[1], area.dy.dot(f))
+}
+
+/// Expected squared error of a pixel with the sides `sides` (ideal px), of the linear range: with the mean over the path exact, and with its
+/// samples. `beside_px` is where its source lies between ideal pixels.
+pub(super) fn error2(
+    spectrum: &Spectrum,
+    filter: &SurfaceFilter,
+    sides: DMat2,
+    area: &Footprint,
+    path: Option<Path>,
+    beside_px: DVec2,
+) -> [f64; 2] {
+    let per_texel = filter.texel_from_ideal.determinant().abs().recip();
+    let soft = |k: usize| area.spline.map(|softness| softness[k]);
+    let mut sums = [0.0; 2];
+    for i in 0..OCTAVES * AN_OCTAVE {
+        let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
+        // Of a half-plane: the other half is its mirror image.
+        let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
+        for j in 0..DIRECTIONS {
+            let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
+            let cycles = filter.texel_cycles * f;
+            if cycles.abs().max_element() > MOST_CYCLES {
+                continue;
+            }
+            let power = weight * per_texel * spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
+            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
+            let ideal = filter.leaves(cycles);
+            // The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
+            let [mut smooth, mut in_samples] = [Wave::ZERO; 2];
+            let whole = f.round();
+            for away in [-1.0, 0.0, 1.0].into_iter().flat_map(|x| [-1.0, 0.0, 1.0].map(|y| DVec2::new(x, y) - whole)) {
+                let seen = f + away;
+                let turned = ideal * read(soft(0), seen.x) * read(soft(1), seen.y) * Wave::from_angle(2.0 * PI * away.dot(beside_px));
+                let over_area = turned * grid(area, seen);
+                match path {
+                    None => smooth += over_area,
+                    Some(path) => {
+                        smooth += over_area * sinc(path.along.dot(seen));
+                        in_samples += turned.rotate(sampled(area, path, seen));
+                    }
+                }
+            }
+            let error = |found: Wave| power * (found - Wave::new(exact, 0.0)).length_squared();
+            sums[0] += error(smooth);
+            sums[1] += error(if path.is_some() { in_samples } else { smooth });
+        }
+    }
+    sums
+}
