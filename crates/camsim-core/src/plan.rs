@@ -111,8 +111,10 @@ pub enum TemporalStage {
 /// Motion blur.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlurStage {
-    /// Exactly solved poses over the exposure.
+    /// Exactly known poses over the exposure.
     pub nodes: u32,
+    /// All of them take the key frame's depth that mid-exposure finds; otherwise each looks up its own.
+    pub one_depth: bool,
     /// Samples a pixel of path (up to 16 px; one a pixel beyond).
     pub samples_per_px: f64,
     /// Cap of the samples between two nodes.
@@ -299,13 +301,13 @@ impl Planner {
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(quality);
         let is_paper = quality.preset == Preset::Paper;
-        let geometry = |keys: &[KeyFrame], scale: f64| {
-            let displaced = demanded.map(|stage| (stage, key_twist));
+        let geometry = |keys: &[KeyFrame], scale: f64, displaced: Option<(TemporalStage, Twist)>| {
             bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced, scale)
         };
+        let displaced = demanded.map(|stage| (stage, key_twist));
         let one_key = keys::spread(path, window_s, 1);
         let least_scale = reach.least_scale();
-        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale) };
+        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale, displaced) };
         let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
         let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, &self.surfaces);
         let nodes_of = |motion: &Motion, ideal: &IdealGeometry, skipped: &mut Vec<Skip>| {
@@ -321,7 +323,7 @@ impl Planner {
             prospect.choose(quality, least_scale, nodes, fits)
         };
         if sampling.scale != least_scale && !is_paper {
-            ideal = geometry(&one_key, sampling.scale);
+            ideal = geometry(&one_key, sampling.scale, displaced);
             motion = measure(&ideal);
         }
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
@@ -354,15 +356,22 @@ impl Planner {
             ray,
             blur,
             surfaces: &self.surfaces,
+            straight_blur: blur.map(|_| sampling.blur_stage(2, quality, motion.blur_px)),
             expected,
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
         };
-        let error::Choice { temporal, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
+        let error::Choice { way, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
+        let error::Way { temporal, blur } = way;
+        let displaced = Some((temporal, key_twist));
+        if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
+            // These look, and read the depth, where the point is not.
+            ideal = geometry(&one_key, sampling.scale, displaced);
+        }
         motion::note_skips(&motion, temporal, &mut skipped);
         let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(path, window_s, count);
-            let ideal = geometry(&keys, sampling.scale);
+            let ideal = geometry(&keys, sampling.scale, displaced);
             (keys, ideal)
         });
         let keys = keys.map_or(one_key, |(keys, of_keys)| {

@@ -122,14 +122,47 @@ pub fn reproject(
     let mut w = 0.0;
     for _ in 0..iterations {
         let found = depth.inverse_depth(ideal.px_from_point(direction + w * shift));
-        let scale = 1.0 - shift.z * found;
-        if scale > 1e-3 {
-            w = found * direction.z / scale;
-        }
+        w = depth_on_line(direction, shift, found).unwrap_or(w);
     }
     let in_key = direction + w * shift;
     let at_px = ideal.px_from_point(in_key);
     (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+}
+
+/// The key frame's inverse depth that the last of `iterations` look-ups of [`reproject`] finds, 1/m.
+#[must_use]
+pub fn settled_inverse_depth(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    iterations: u32,
+    depth: &InverseDepthImage<'_>,
+    ideal: &IdealGeometry,
+) -> f64 {
+    let (rotation, shift) = key_from_line;
+    let direction = rotation * uv.extend(1.0);
+    let (mut w, mut found) = (0.0, 0.0);
+    for _ in 0..iterations {
+        found = depth.inverse_depth(ideal.px_from_point(direction + w * shift));
+        w = depth_on_line(direction, shift, found).unwrap_or(w);
+    }
+    found
+}
+
+/// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of [`reproject`].
+#[must_use]
+pub fn reproject_with(uv: DVec2, key_from_line: (DMat3, DVec3), found: f64, ideal: &IdealGeometry) -> Option<Source> {
+    let (rotation, shift) = key_from_line;
+    let direction = rotation * uv.extend(1.0);
+    let w = depth_on_line(direction, shift, found).unwrap_or(0.0);
+    let in_key = direction + w * shift;
+    let at_px = ideal.px_from_point(in_key);
+    (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+}
+
+/// `None` at or behind the line's own image plane.
+fn depth_on_line(direction: DVec3, shift: DVec3, found: f64) -> Option<f64> {
+    let scale = 1.0 - shift.z * found;
+    (scale > 1e-3).then(|| found * direction.z / scale)
 }
 
 /// Samples for a stretch of path: `min(a L, L + 16)`, at least `at_least`, at most `cap` (NUMERICS section 3: a = 2 keeps white texture below 1/255).
@@ -243,12 +276,15 @@ impl Footprint {
         Self { dx, dy, taps, spline }
     }
 
-    /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
+    /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels. Each tap is followed by the one opposite, so that any even number of
+    /// them has the centre as its mean.
     #[must_use]
     pub fn offset_px(&self, i: u32) -> DVec2 {
         let [nx, ny] = self.taps;
-        let fx = (f64::from(i % nx) + 0.5) / f64::from(nx) - 0.5;
-        let fy = (f64::from((i / nx) % ny) + 0.5) / f64::from(ny) - 0.5;
+        let turn = i % (nx * ny);
+        let place = if turn % 2 == 1 { nx * ny - 1 - turn / 2 } else { turn / 2 };
+        let fx = (f64::from(place % nx) + 0.5) / f64::from(nx) - 0.5;
+        let fy = (f64::from(place / nx) + 0.5) / f64::from(ny) - 0.5;
         self.dx * fx + self.dy * fy
     }
 

@@ -67,6 +67,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
+    /// All nodes of the exposure take the depth of mid-exposure.
+    pub one_depth: bool,
     /// What reads the ideal frame.
     pub tap: TapKind,
     /// More than one ideal frame.
@@ -94,6 +96,7 @@ impl PipelineKey {
             ray: plan.ray,
             temporal,
             blur: plan.blur.is_some(),
+            one_depth: plan.blur.is_some_and(|blur| blur.one_depth),
             tap: plan.taps.into(),
             keys: plan.keys.len() > 1,
             edges: plan.edges != EdgeStage::None,
@@ -120,17 +123,21 @@ impl PipelineKey {
                         if several && !parallax {
                             continue;
                         }
-                        for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
-                            keys.extend([false, true].map(|truth| Self {
-                                ray,
-                                temporal,
-                                blur,
-                                tap,
-                                keys: several,
-                                edges,
-                                truth,
-                                paper: false,
-                            }));
+                        let looks_up = blur && temporal == Reproject;
+                        for one_depth in [false, true].into_iter().filter(|&one_depth| looks_up || !one_depth) {
+                            for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
+                                keys.extend([false, true].map(|truth| Self {
+                                    ray,
+                                    temporal,
+                                    blur,
+                                    one_depth,
+                                    tap,
+                                    keys: several,
+                                    edges,
+                                    truth,
+                                    paper: false,
+                                }));
+                            }
                         }
                     }
                 }
@@ -142,6 +149,7 @@ impl PipelineKey {
                     ray,
                     temporal: Rk2,
                     blur,
+                    one_depth: false,
                     tap: TapKind::Bilinear,
                     keys: false,
                     edges: false,
@@ -155,7 +163,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 9] {
+    pub fn slots(&self) -> [Slot; 10] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -191,6 +199,7 @@ impl PipelineKey {
             ("depth", depth),
             ("temporal_inverse", temporal),
             ("gather", gather),
+            ("nodes", if self.one_depth { "reverse/gather/nodes/one_depth.wgsl" } else { "reverse/gather/nodes/own_depth.wgsl" }),
             ("tap", tap),
             ("edges", edges),
             ("color", color),
@@ -445,6 +454,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 272);
+        assert_eq!(PipelineKey::all().len(), 320);
     }
 }

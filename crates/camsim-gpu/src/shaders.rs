@@ -33,6 +33,8 @@ embedded![
     "reverse/gather/blur.wgsl",
     "reverse/gather/footprint.wgsl",
     "reverse/gather/interface.wgsl",
+    "reverse/gather/nodes/one_depth.wgsl",
+    "reverse/gather/nodes/own_depth.wgsl",
     "reverse/gather/sharp.wgsl",
     "reverse/gather/straight.wgsl",
     "reverse/gather/tap/bilinear.wgsl",

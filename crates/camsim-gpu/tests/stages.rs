@@ -10,7 +10,9 @@ use camsim_core::{
     plan::{RayStage, TemporalStage, line_poses},
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, ZoomSpec},
     sequence::{GrayImage, Sequence},
-    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage, gather, reproject},
+    temporal::{
+        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage, gather, reproject, reproject_with, settled_inverse_depth,
+    },
 };
 use common::{engine, pattern, render, scenario, sequence, steady};
 use glam::{DMat3, DVec2, DVec3};
@@ -106,7 +108,9 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             }
             worst_px = worst_px.max(at_px.distance(DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]))));
             worst_depth = worst_depth.max((f64::from(depths[i]) * inverse_depth - 1.0).abs());
-            let Some(nodes) = (0..blur.nodes).map(|node| solve(node).map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
+            let found = settled_inverse_depth(uv, entry(blur.nodes), iterations, &depth, &ideal.geometry);
+            let of_node = |node| if blur.one_depth { reproject_with(uv, entry(node), found, &ideal.geometry) } else { solve(node) };
+            let Some(nodes) = (0..blur.nodes).map(|node| of_node(node).map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
             let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.taps);
             let expected = gather(&nodes, &area, &color, blur.samples_per_px, blur.max_samples);
             let found = DVec3::new(

@@ -11,16 +11,42 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let shift = translation(pose);
     var w = 0.0;
     for (var i = 0u; i < frame.iterations; i++) {
-        let found = inverse_depth(ideal_px_from_point(direction + w * shift));
-        let scale = 1.0 - shift.z * found;
-        // The surface is at or behind the line's own image plane: keep the last guess.
-        if (scale > 1e-3) {
-            w = found * direction.z / scale;
-        }
+        w = depth_on_line(direction, shift, inverse_depth(ideal_px_from_point(direction + w * shift)), w);
     }
+    return source_at(direction, shift, w);
+}
+
+// The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or behind the line's own image plane the
+// last guess is kept.
+fn depth_on_line(direction: vec3<f32>, shift: vec3<f32>, found: f32, guess: f32) -> f32 {
+    let scale = 1.0 - shift.z * found;
+    return select(guess, found * direction.z / scale, scale > 1e-3);
+}
+
+fn source_at(direction: vec3<f32>, shift: vec3<f32>, w: f32) -> Source {
     let in_key = direction + w * shift;
     let at_px = ideal_px_from_point(in_key);
     return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px));
+}
+
+// The key frame's inverse depth that the last look-up of the temporal inverse finds.
+fn settled_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
+    let direction = rotate(pose, vec3<f32>(uv, 1.0));
+    let shift = translation(pose);
+    var w = 0.0;
+    var found = 0.0;
+    for (var i = 0u; i < frame.iterations; i++) {
+        found = inverse_depth(ideal_px_from_point(direction + w * shift));
+        w = depth_on_line(direction, shift, found, w);
+    }
+    return found;
+}
+
+// Where a surface of this inverse depth in the key frame is seen.
+fn source_of_depth(uv: vec2<f32>, pose: Pose, found: f32) -> Source {
+    let direction = rotate(pose, vec3<f32>(uv, 1.0));
+    let shift = translation(pose);
+    return source_at(direction, shift, depth_on_line(direction, shift, found, 0.0));
 }
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {

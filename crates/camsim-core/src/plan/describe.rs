@@ -106,7 +106,10 @@ impl FramePlan {
         let gather = match self.blur {
             None => "sharp".to_owned(),
             Some(blur) if self.preset == Preset::Paper => format!("straight blur of {} samples, ends included", blur.max_samples),
-            Some(blur) => format!("blur with {} nodes, {} samples a px", blur.nodes, blur.samples_per_px),
+            Some(blur) => {
+                let depth = if blur.one_depth { " of one depth" } else { "" };
+                format!("blur with {} nodes{depth}, {:.2} samples a px", blur.nodes, blur.samples_per_px)
+            }
         };
         let taps = match self.taps {
             TapStage::Bilinear => "bilinear".to_owned(),

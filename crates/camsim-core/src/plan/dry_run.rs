@@ -43,8 +43,9 @@ pub(super) struct Trial<'a> {
 /// Where a probe truly looks.
 #[derive(Clone, Copy)]
 pub(super) struct Truth {
-    /// Instant, path time.
+    /// Instant, path time, and where in the exposure it is: -0.5 to 0.5.
     pub t_s: f64,
+    phase: f64,
     /// Source.
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
@@ -65,6 +66,8 @@ pub(super) struct Outcome {
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
     pub after: [f64; MAX_LOOK_UPS + 1],
+    /// With the depth that n look-ups find at mid-exposure.
+    pub of_mid: [f64; MAX_LOOK_UPS + 1],
     /// The part of it that more look-ups would mend.
     pub unsettled: [f64; MAX_LOOK_UPS + 1],
     /// Equation 16 and equation 18.
@@ -98,6 +101,7 @@ impl Trial<'_> {
         }
         Some(Truth {
             t_s,
+            phase,
             at_px,
             inverse_depth,
             key_inverse_depth: inverse_depth / point.z,
@@ -119,6 +123,21 @@ impl Trial<'_> {
         outcome.after = places.map(off);
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
+        outcome.of_mid = if truth.phase == 0.0 {
+            outcome.after
+        } else {
+            let shift = truth.in_key.1;
+            let mid = self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose);
+            let looked_at = settle(probe.uv, mid, self.ideal, &mut depth);
+            std::array::from_fn(|n| match n.checked_sub(1) {
+                None => outcome.parallax_px,
+                Some(last) => {
+                    let found = depth.inverse_depth(looked_at[last]);
+                    let w = depth_on_line(truth.direction, shift, found).unwrap_or(0.0);
+                    off(self.ideal.px_from_point(truth.direction + w * shift))
+                }
+            })
+        };
         let dt_s = truth.t_s - self.key_s;
         let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
         let displaced = |stage: TemporalStage| {
@@ -212,15 +231,17 @@ fn settle(uv: DVec2, (rotation, shift): (DMat3, DVec3), ideal: &IdealGeometry, d
         // A place that gives itself again will do so for ever.
         if n > 0 && at_px != last_px {
             last_px = at_px;
-            let found = depth.inverse_depth(at_px);
-            let scale = 1.0 - shift.z * found;
-            if scale > 1e-3 {
-                w = found * direction.z / scale;
-            }
+            w = depth_on_line(direction, shift, depth.inverse_depth(at_px)).unwrap_or(w);
             at_px = ideal.px_from_point(direction + w * shift);
         }
         at_px
     })
+}
+
+/// As [`crate::temporal::reproject`]: `None` at or behind the line's own image plane.
+fn depth_on_line(direction: DVec3, shift: DVec3, found: f64) -> Option<f64> {
+    let scale = 1.0 - shift.z * found;
+    (scale > 1e-3).then(|| found * direction.z / scale)
 }
 
 impl KeyDepth<'_> {

@@ -20,11 +20,14 @@ use super::{
 use crate::{
     camera::CameraModel,
     pose::CameraPose,
-    scenario::Preset,
+    scenario::{Auto, Preset},
     scene::{LodSelection, select_lod},
     sequence::Sequence,
     shutter::Shutter,
-    temporal::{IdealGeometry, displacement::Twist},
+    temporal::{
+        IdealGeometry,
+        displacement::{RK2_STEP_DEG, Twist},
+    },
 };
 
 /// Times the largest error found.
@@ -33,6 +36,8 @@ const SAFETY: f64 = 1.25;
 const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
 const BOUND_SHARE: f64 = 0.5;
+/// Steps of eq. 18 up to which it takes less time than a look-up of depth in every node.
+const CHEAP_RK2_STEPS: f64 = 2.0;
 /// Probes whose exposure is looked at.
 const CHORD_PROBES: usize = 32;
 /// Stretches of path looked at for each of them.
@@ -87,15 +92,24 @@ pub(super) struct Case<'a> {
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
     pub surfaces: &'a Surfaces,
+    /// The same for a path that is a straight line whatever its nodes.
+    pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
 }
 
 /// What was chosen, and what it leads to.
 pub(super) struct Choice {
-    pub temporal: TemporalStage,
+    pub way: Way,
     pub terrain_error_px: f64,
     pub predicted: Predicted,
+}
+
+/// A temporal inverse, and the exposure that it is used for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Way {
+    pub temporal: TemporalStage,
+    pub blur: Option<BlurStage>,
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
@@ -112,15 +126,41 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
         lod = case.level_of_detail(terrain_error_px);
     }
     let forecast = truths.forecast(&lod);
-    let budget_px = tolerance_px - forecast.nodes_px(case.blur);
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
-    let temporal = demanded.unwrap_or_else(|| forecast.choose(budget_px, may_skip_depth));
-    let predicted = forecast.predict(case, temporal);
-    Choice { temporal, terrain_error_px, predicted }
+    let way = match demanded {
+        Some(temporal) => Way { temporal, blur: case.blur },
+        None => forecast.choose(tolerance_px, case.ways(motion, edges, may_skip_depth)),
+    };
+    let predicted = forecast.predict(case, way);
+    Choice { way, terrain_error_px, predicted }
 }
 
 impl Case<'_> {
+    /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the depth beside where they look: not
+    /// for silhouettes.
+    fn ways(&self, motion: &Motion, edges: EdgeStage, may_skip_depth: bool) -> Vec<Way> {
+        let quality = &self.sequence.scenario.quality;
+        let with = |temporal| Way { temporal, blur: self.blur };
+        let mut ways = Vec::new();
+        if may_skip_depth {
+            ways.extend([TemporalStage::Identity, TemporalStage::Rotation].map(with));
+        }
+        if quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && edges == EdgeStage::None {
+            ways.push(Way { temporal: TemporalStage::Linear, blur: self.straight_blur });
+            if motion.rotation_rad < CHEAP_RK2_STEPS * RK2_STEP_DEG.to_radians() {
+                ways.push(with(TemporalStage::Rk2));
+            }
+        }
+        let look_ups = |one_depth: bool| {
+            let blur = self.blur.map(|blur| BlurStage { one_depth, ..blur });
+            (1..=MAX_LOOK_UPS as u32).map(move |iterations| Way { temporal: TemporalStage::Reproject { iterations }, blur })
+        };
+        ways.extend(look_ups(true).filter(|way| way.blur.is_some()));
+        ways.extend(look_ups(false));
+        ways
+    }
+
     /// The choice that the ideal pass will make.
     fn level_of_detail(&self, max_error_px: f64) -> LodSelection {
         self.sequence.scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
@@ -206,37 +246,42 @@ impl Forecast<'_> {
     }
 
     /// Without the chords of the exposure.
-    pub fn total_px(&self, stage: TemporalStage) -> f64 {
-        self.largest(|looked, run| SAFETY * error_px(run, stage) + self.rounding(looked, run, stage).total_px())
+    pub fn total_px(&self, way: Way) -> f64 {
+        self.largest(|looked, run| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px())
     }
 
-    /// The cheapest stage within `budget_px`, or the best there is.
-    pub fn choose(&self, budget_px: f64, may_skip_depth: bool) -> TemporalStage {
-        let stages = [TemporalStage::Identity, TemporalStage::Rotation].into_iter().filter(|_| may_skip_depth);
-        let stages = stages.chain((1..=MAX_LOOK_UPS as u32).map(|iterations| TemporalStage::Reproject { iterations }));
-        let mut best = (f64::INFINITY, TemporalStage::Reproject { iterations: 2 });
-        for stage in stages {
-            let total_px = self.total_px(stage);
-            if total_px <= budget_px {
-                return stage;
+    /// The first way within the tolerance, or the best there is.
+    pub fn choose(&self, tolerance_px: f64, ways: Vec<Way>) -> Way {
+        let mut best: Option<(f64, Way)> = None;
+        let mut known_nodes: Vec<(u32, f64)> = Vec::new();
+        for way in ways {
+            let nodes = way.blur.map_or(1, |blur| blur.nodes);
+            let nodes_px = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
+                let px = self.nodes_px(way.blur);
+                known_nodes.push((nodes, px));
+                px
+            });
+            let total_px = self.total_px(way) + nodes_px;
+            if total_px <= tolerance_px {
+                return way;
             }
-            // A look-up that gains less than a twentieth is not worth its time.
-            if total_px < 0.95 * best.0 {
-                best = (total_px, stage);
+            // What gains less than a twentieth is not worth its time.
+            if best.is_none_or(|(px, _)| total_px < 0.95 * px) {
+                best = Some((total_px, way));
             }
         }
-        best.1
+        best.map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way)
     }
 
     /// The errors of a stage by cause.
-    pub fn predict(&self, case: &Case<'_>, stage: TemporalStage) -> Predicted {
-        let (blur, max_error_px) = (case.blur, case.sequence.scenario.quality.max_error_px);
+    pub fn predict(&self, case: &Case<'_>, way: Way) -> Predicted {
+        let (Way { temporal: stage, blur }, max_error_px) = (way, case.sequence.scenario.quality.max_error_px);
         let nodes_px = self.nodes_px(blur);
-        let total_px = self.total_px(stage) + nodes_px;
+        let total_px = self.total_px(way) + nodes_px;
         let Expected { resampling_dn, blur_dn } = case.expected;
         let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
         let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
-        let temporal_px = SAFETY * self.largest(|_, run| unsettled_px(run, stage));
+        let temporal_px = SAFETY * self.largest(|_, run| unsettled_px(run, way));
         let depth_px = match stage {
             TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
@@ -289,21 +334,26 @@ impl Forecast<'_> {
     }
 }
 
-/// Error of a stage at a probe.
-fn error_px(run: &Outcome, stage: TemporalStage) -> f64 {
-    match stage {
+/// Error of a way at a probe.
+fn error_px(run: &Outcome, way: Way) -> f64 {
+    match way.temporal {
         TemporalStage::Identity => run.still_px,
         TemporalStage::Rotation => run.after[0],
         TemporalStage::Linear => run.linear_px,
         TemporalStage::Rk2 => run.rk2_px,
-        TemporalStage::Reproject { iterations } => run.after[(iterations as usize).min(MAX_LOOK_UPS)],
+        TemporalStage::Reproject { iterations } => {
+            let look_ups = (iterations as usize).min(MAX_LOOK_UPS);
+            if way.blur.is_some_and(|blur| blur.one_depth) { run.of_mid[look_ups].max(run.after[look_ups]) } else { run.after[look_ups] }
+        }
     }
 }
 
 /// The part of it that a better temporal inverse would mend.
-fn unsettled_px(run: &Outcome, stage: TemporalStage) -> f64 {
-    match stage {
-        TemporalStage::Reproject { iterations } => run.unsettled[(iterations as usize).min(MAX_LOOK_UPS)],
-        _ => error_px(run, stage),
+fn unsettled_px(run: &Outcome, way: Way) -> f64 {
+    match way {
+        Way { temporal: TemporalStage::Reproject { iterations }, blur } if !blur.is_some_and(|blur| blur.one_depth) => {
+            run.unsettled[(iterations as usize).min(MAX_LOOK_UPS)]
+        }
+        _ => error_px(run, way),
     }
 }

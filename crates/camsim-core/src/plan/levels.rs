@@ -14,7 +14,7 @@ use super::{
     BlurStage, LensReach,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
-    surfaces::Surfaces,
+    surfaces::{Met, Surfaces},
     transfer::{Path, SurfaceFilter, error2},
 };
 use crate::{
@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// Probes that are looked at, at most.
-const SIGHTS: usize = 20;
+const SIGHTS: usize = 32;
 /// Times what is expected: textures are not equally grainy everywhere.
 const SAFETY: f64 = 1.15;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
@@ -75,10 +75,12 @@ struct Sight<'a> {
     spectrum: &'a Spectrum,
     /// Of the linear range, for each unit of texture.
     gain: f64,
-    /// d(camera px)/d(output px) and d(texel)/d(camera px).
+    /// d(camera px)/d(output px), d(key px)/d(camera px), d(texel)/d(key px): from the line's camera to that of the ideal frame the same
+    /// pixel may grow or turn.
     camera_from_px: DMat2,
-    texel_from_camera: DMat2,
-    /// Source in the key frame from its principal point, and path over the exposure, camera px.
+    key_from_camera: DMat2,
+    texel_from_key: DMat2,
+    /// Source in the key frame from its principal point, and path over the exposure there, camera px.
     key_px: DVec2,
     path: DVec2,
     path_px: f64,
@@ -118,19 +120,23 @@ impl<'a> Prospect<'a> {
             let [x, y] = probe.pixel;
             let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
             let pose = sequence.path.pose(mid_s);
-            let shown = Shown::new(surfaces, &pose, probe.uv, focal_px)?;
             let (rotation, shift) = pose.relative_to(key_pose);
-            let in_key = rotation * probe.uv.extend(1.0) + shown.inverse_depth * shift;
+            let key_px = |uv: DVec2, inverse_depth: f64| {
+                let in_key = rotation * uv.extend(1.0) + inverse_depth * shift;
+                focal_px * in_key.truncate() / in_key.z
+            };
+            let shown = Shown::new(surfaces, &pose, probe.uv, focal_px, key_px)?;
             let path = path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
             let clear =
                 sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
             Some(Sight {
                 spectrum: grain.of(shown.surface)?,
                 gain: weight(probe.pixel) * photometric.light * clear,
-                key_px: focal_px * in_key.truncate() / in_key.z,
+                key_px: shown.key_px,
+                key_from_camera: shown.key_from_camera,
                 camera_from_px: DMat2::from_diagonal(focal_px) * probe.uv_from_px,
-                texel_from_camera: shown.texel_from_camera,
-                path: path.0,
+                texel_from_key: shown.texel_from_camera * shown.key_from_camera.inverse(),
+                path: shown.key_from_camera * path.0,
                 path_px: path.1,
             })
         };
@@ -154,15 +160,15 @@ impl<'a> Prospect<'a> {
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let filter = SurfaceFilter::new(sight.texel_from_camera * scale.recip());
-            let samples = blur.map(|BlurStage { nodes, samples_per_px, max_samples }| {
+            let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip());
+            let samples = blur.map(|BlurStage { nodes, samples_per_px, max_samples, .. }| {
                 let segments = nodes - 1;
                 let at_least = (area.taps[0] * area.taps[1]).div_ceil(segments);
                 segments * samples_for(scale * sight.path_px / f64::from(segments), samples_per_px, at_least, max_samples)
             });
             let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
             let path = samples.map(|samples| Path { along: scale * sight.path, samples });
-            let error = error2(sight.spectrum, &filter, sides, &area, path, beside_px);
+            let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
             error.map(|square| sight.gain * sight.gain * square)
         };
         let sums = self.sights.par_iter().map(of).reduce(|| [0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
@@ -192,7 +198,7 @@ impl<'a> Prospect<'a> {
             let choices = if nodes > 1 { per_px(scale) } else { vec![0.0] };
             let expect = |samples_per_px: f64| {
                 let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
-                let blur = (nodes > 1).then_some(BlurStage { nodes, samples_per_px, max_samples });
+                let blur = (nodes > 1).then_some(BlurStage { nodes, one_depth: false, samples_per_px, max_samples });
                 Sampling { scale, taps, samples_per_px, expected: self.expect(scale, taps, blur) }
             };
             let Some(most) = choices.last().map(|&samples| expect(samples)) else { continue };
@@ -246,11 +252,14 @@ struct Shown {
     inverse_depth: f64,
     range_m: f64,
     texel_from_camera: DMat2,
+    /// In the key frame, from its principal point, camera px.
+    key_px: DVec2,
+    key_from_camera: DMat2,
 }
 
 impl Shown {
     /// By the ray itself and two beside it; `None` for the sky, a texture of one colour, and where the three meet different surfaces.
-    fn new(surfaces: &Surfaces, pose: &CameraPose, uv: DVec2, focal_px: DVec2) -> Option<Self> {
+    fn new(surfaces: &Surfaces, pose: &CameraPose, uv: DVec2, focal_px: DVec2, key_px: impl Fn(DVec2, f64) -> DVec2) -> Option<Self> {
         const BESIDE_PX: f64 = 0.5;
         let look = |offset_px: DVec2| surfaces.meet(pose.position_ned_m, pose.ned_from_camera * (uv + offset_px / focal_px).extend(1.0));
         let here = look(DVec2::ZERO)?;
@@ -258,7 +267,13 @@ impl Shown {
         let [x, y] = [beside[0].as_ref()?, beside[1].as_ref()?];
         let texel_from_camera =
             DMat2::from_cols(surfaces.texel(x) - surfaces.texel(&here), surfaces.texel(y) - surfaces.texel(&here)) * BESIDE_PX.recip();
-        (texel_from_camera.determinant().abs() > 1e-12).then_some(Self {
+        let own_key_px = key_px(uv, here.depth_m.recip());
+        let moved = |axis: DVec2, beside: &Met| key_px(uv + BESIDE_PX * axis / focal_px, beside.depth_m.recip()) - own_key_px;
+        let key_from_camera = DMat2::from_cols(moved(DVec2::X, x), moved(DVec2::Y, y)) * BESIDE_PX.recip();
+        let regular = |map: &DMat2| map.determinant().abs() > 1e-12 && map.is_finite();
+        (regular(&texel_from_camera) && regular(&key_from_camera)).then_some(Self {
+            key_px: own_key_px,
+            key_from_camera,
             surface: here.surface,
             inverse_depth: here.depth_m.recip(),
             range_m: here.depth_m * uv.extend(1.0).length(),
@@ -314,6 +329,6 @@ impl Sampling {
             Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
             None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, MAX_SAMPLES)),
         };
-        BlurStage { nodes, samples_per_px, max_samples }
+        BlurStage { nodes, one_depth: false, samples_per_px, max_samples }
     }
 }

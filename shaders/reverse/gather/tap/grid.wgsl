@@ -25,12 +25,16 @@ fn footprint(ray: Ray) -> Footprint {
     return Footprint(dx, dy, softness_of(stretch), taps);
 }
 
-// Colour of tap i around a source; taps are taken in turns.
+// Colour of tap i around a source. Taps are taken in turns, each followed by the one opposite, so that any even number of them has the
+// pixel's centre as its mean.
 fn tap_color(area: Footprint, source_px: vec2<f32>, i: u32) -> vec4<f32> {
     if (area.taps.x * area.taps.y == 1u) {
         return ideal_color_by_spline(source_px, area.softness);
     }
-    let cell = vec2<f32>(f32(i % area.taps.x), f32((i / area.taps.x) % area.taps.y));
+    let count = area.taps.x * area.taps.y;
+    let turn = i % count;
+    let place = select(turn / 2u, count - 1u - turn / 2u, turn % 2u == 1u);
+    let cell = vec2<f32>(f32(place % area.taps.x), f32(place / area.taps.x));
     let share = (cell + 0.5) / vec2<f32>(area.taps) - 0.5;
     return ideal_color_at(source_px + area.dx * share.x + area.dy * share.y);
 }
