@@ -82,10 +82,16 @@ impl Times {
         (!self.processor_ms.is_empty()).then(|| quantile(&self.processor_ms, 0.5))
     }
 
-    /// Quartiles of this variant's time over another's in the rounds that both were in.
+    /// This variant's time over another's in the rounds that both were in.
+    #[must_use]
+    pub fn ratios(&self, other: &Self) -> Vec<f64> {
+        self.wall_ms.iter().zip(&other.wall_ms).map(|(own, other)| own / other).collect()
+    }
+
+    /// Quartiles of [`Self::ratios`].
     #[must_use]
     pub fn ratio_to(&self, other: &Self) -> [f64; 3] {
-        quartiles(&self.wall_ms.iter().zip(&other.wall_ms).map(|(own, other)| own / other).collect::<Vec<_>>())
+        quartiles(&self.ratios(other))
     }
 }
 

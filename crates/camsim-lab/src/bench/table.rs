@@ -135,10 +135,11 @@ impl Report {
         }
         for violation in &self.violations {
             let [own_px, better_px] = violation.coord_rms_px.map(pixels);
+            let [own_p99_px, better_p99_px] = violation.smooth_p99_px.map(pixels);
             let [own_db, better_db] = violation.psnr_db.map(decimal);
             writeln!(
                 text,
-                "- {}: {} takes {:.2} times the time of {} for {own_px} px RMS against {better_px} and {own_db} dB against {better_db}",
+                "- {}: {} takes {:.2} times the time of {} for {own_px} px RMS against {better_px}, {own_p99_px} px away from silhouettes (99 %) against {better_p99_px}, {own_db} dB against {better_db}",
                 violation.case, violation.row, violation.time_ratio, violation.better,
             )?;
         }
