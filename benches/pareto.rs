@@ -6,7 +6,7 @@
 
 use camsim::{
     gpu::{AdapterChoice, Engine},
-    lab::bench::{Options, run},
+    lab::bench::{BenchError, Options, Step, run},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -14,7 +14,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let measuring = std::env::args().any(|argument| argument == "--bench");
     let engine = Engine::new(AdapterChoice::Best)?;
     let cases = if measuring { Vec::new() } else { vec!["plane-30".to_owned()] };
-    let report = run(&engine, &Options { cases, quick: true }, &mut |step| eprintln!("{step}"))?;
+    let report = run::<BenchError>(&engine, &Options { cases, quick: true }, &mut |step| {
+        if let Step::Begins(what) = step {
+            eprintln!("{what}");
+        }
+        Ok(())
+    })?;
     println!("{}", report.markdown());
     println!("{}", report.summary());
     Ok(())

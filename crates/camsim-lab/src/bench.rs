@@ -5,12 +5,7 @@
 
 use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Instant};
 
-use camsim_core::{
-    mount::MountError,
-    reference::OracleError,
-    scenario::{Preset, validate},
-    sequence::Sequence,
-};
+use camsim_core::{mount::MountError, reference::OracleError, scenario::validate};
 use camsim_gpu::{Engine, GpuError, RenderError};
 use serde::Serialize;
 
@@ -22,20 +17,20 @@ use crate::{
 pub mod ablation;
 mod blit;
 pub mod knobs;
+mod measure;
 mod pareto;
 pub mod rounds;
+mod row;
 mod table;
 pub mod truth;
 
 pub use ablation::AblationRow;
 pub use pareto::Violation;
+pub use row::{Refused, Row};
 
-use knobs::{DEFAULT, Family, Variant, variants};
-use rounds::{Effort, Times};
-use truth::{Errors, Truth};
+use knobs::{Variant, WHOLE, variants};
+use rounds::Effort;
 
-/// The case of which the ablation is measured.
-const ABLATED: &str = "all-effects";
 /// Cases of the short form: one of each kind.
 const QUICK: [&str; 4] = ["plane-30", "terrain-100", "buildings-15", "blender-plane"];
 /// Size of the short form.
@@ -81,145 +76,6 @@ pub struct Options {
     pub quick: bool,
 }
 
-/// One point of the table. The first twelve are the stable ones.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    /// Name of the case.
-    pub case: String,
-    /// `default` or `paper`.
-    pub preset: &'static str,
-    /// Output width.
-    pub width: u32,
-    /// Output height.
-    pub height: u32,
-    /// Milliseconds a frame, median of the rounds.
-    pub ms_per_frame_p50: f64,
-    /// The same, 99th percentile.
-    pub ms_per_frame_p99: f64,
-    /// Processor milliseconds a frame over all threads, median; null where it is not known.
-    pub cpu_ms_per_frame: Option<f64>,
-    /// RMS error of the source coordinates, px; null where it was not measured.
-    pub coord_rms_px: Option<f64>,
-    /// 99th percentile.
-    pub coord_p99_px: Option<f64>,
-    /// Largest.
-    pub coord_max_px: Option<f64>,
-    /// Of linear values with peak 1 against the oracle's picture.
-    pub psnr_db: Option<f64>,
-    /// The plan's own bound on `coord_p99_px`, px.
-    pub predicted_px: Option<f64>,
-    /// What is forced, or `auto` and the tolerance.
-    pub knob: String,
-    /// What the row varies.
-    #[serde(skip)]
-    pub family: Family,
-    /// Kind of the case.
-    pub group: &'static str,
-    /// Time over that of the case's default row in the same round: quartiles.
-    pub time_to_default: Option<[f64; 3]>,
-    /// PSNR of pixels within 3 px of a silhouette; null without silhouettes.
-    pub edge_psnr_db: Option<f64>,
-    /// RMS of pixels farther than that from any silhouette, px.
-    pub smooth_rms_px: Option<f64>,
-    /// 99th percentile of the same: what `predicted_px` bounds.
-    pub smooth_p99_px: Option<f64>,
-    /// Share of the compared pixels within 3 px of a silhouette.
-    pub edge_share: Option<f64>,
-    /// Pixels compared: coordinates, picture.
-    pub compared: [u64; 2],
-    /// Pixels with a source that the oracle has none for, and the other way round.
-    pub falsely_valid: u64,
-    /// See above.
-    pub missing: u64,
-    /// No row of this case and size has both less time and less coordinate error.
-    pub coord_front: bool,
-    /// The same with PSNR.
-    pub image_front: bool,
-    /// Opening the session and its first two frames, seconds.
-    pub start_s: f64,
-    /// Rounds that the times are of.
-    pub rounds: usize,
-    /// What the plan does.
-    pub passes: Vec<String>,
-    /// Each round's times.
-    #[serde(skip)]
-    pub times: Times,
-}
-
-impl Row {
-    fn empty(case: &str, [width, height]: [u32; 2]) -> Self {
-        Self {
-            case: case.to_owned(),
-            preset: "default",
-            width,
-            height,
-            ms_per_frame_p50: f64::NAN,
-            ms_per_frame_p99: f64::NAN,
-            cpu_ms_per_frame: None,
-            coord_rms_px: None,
-            coord_p99_px: None,
-            coord_max_px: None,
-            psnr_db: None,
-            predicted_px: None,
-            knob: String::new(),
-            family: Family::Tolerance,
-            group: "",
-            time_to_default: None,
-            edge_psnr_db: None,
-            smooth_rms_px: None,
-            smooth_p99_px: None,
-            edge_share: None,
-            compared: [0, 0],
-            falsely_valid: 0,
-            missing: 0,
-            coord_front: false,
-            image_front: false,
-            start_s: 0.0,
-            rounds: 0,
-            passes: Vec::new(),
-            times: Times::default(),
-        }
-    }
-
-    fn set_times(&mut self, times: &Times, default: Option<&Times>) {
-        [self.ms_per_frame_p50, self.ms_per_frame_p99] = times.p50_p99_ms();
-        self.cpu_ms_per_frame = times.processor_p50_ms();
-        self.time_to_default = default.map(|default| times.ratio_to(default));
-        self.start_s = times.start_s;
-        self.rounds = times.wall_ms.len();
-        self.times = times.clone();
-    }
-
-    fn set_errors(&mut self, errors: Errors) {
-        if let Some(coords) = errors.coords {
-            self.coord_rms_px = Some(coords.all.rms_px);
-            self.coord_p99_px = Some(coords.all.p99_px);
-            self.coord_max_px = Some(coords.all.max_px);
-            self.smooth_rms_px = Some(coords.smooth.rms_px);
-            self.smooth_p99_px = Some(coords.smooth.p99_px);
-            self.edge_share = Some(coords.silhouettes.count as f64 / coords.all.count.max(1) as f64);
-            (self.falsely_valid, self.missing) = (coords.falsely_valid, coords.missing);
-            self.compared[0] = coords.all.count;
-        }
-        self.psnr_db = errors.psnr_db;
-        self.edge_psnr_db = errors.edge_psnr_db;
-        self.compared[1] = errors.pictured;
-        self.predicted_px = errors.predicted_px;
-        self.passes = errors.passes;
-    }
-}
-
-/// A row that this version cannot render.
-#[derive(Clone, Debug, Serialize)]
-pub struct Refused {
-    /// The case.
-    pub case: String,
-    /// The row.
-    pub knob: String,
-    /// Why.
-    pub reason: String,
-}
-
 /// Everything that was measured.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -231,6 +87,8 @@ pub struct Report {
     pub cpu_threads: usize,
     /// Whether this is the short form.
     pub quick: bool,
+    /// Cases measured, and all that were asked for: fewer while the run goes on, and if it was interrupted.
+    pub cases: [usize; 2],
     /// The table.
     pub rows: Vec<Row>,
     /// The whole camera without its effects.
@@ -245,18 +103,28 @@ pub struct Report {
     pub elapsed_s: f64,
 }
 
-/// Measures; `progress` hears about each case.
+/// How far a run is.
+#[derive(Debug)]
+pub enum Step<'a> {
+    /// Something begins.
+    Begins(&'a str),
+    /// A case is in the report.
+    Done(&'a Report),
+}
+
+/// Measures; `watch` hears about each case before and after, and ends the run by an error of its own.
 ///
 /// # Errors
-/// An unknown case, or whatever the renderer meets.
-pub fn run(engine: &Engine, options: &Options, progress: &mut dyn FnMut(&str)) -> Result<Report, BenchError> {
+/// An unknown case, or whatever the renderer or `watch` meets.
+pub fn run<E: From<BenchError>>(engine: &Engine, options: &Options, watch: &mut dyn FnMut(Step<'_>) -> Result<(), E>) -> Result<Report, E> {
     let begin = Instant::now();
-    let chosen = choose(cases()?, options)?;
+    let chosen = choose(cases().map_err(BenchError::from)?, options)?;
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
         adapter: engine.gpu().adapter.to_string(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
         quick: options.quick,
+        cases: [0, chosen.len()],
         rows: Vec::new(),
         ablation: Vec::new(),
         violations: Vec::new(),
@@ -265,19 +133,30 @@ pub fn run(engine: &Engine, options: &Options, progress: &mut dyn FnMut(&str)) -
         elapsed_s: 0.0,
     };
     let effort = effort(options.quick);
-    for (i, case) in chosen.iter().enumerate() {
-        let (variants, refused) = usable(case, options.quick);
-        progress(&format!("{} of {}: {}, {} rows", i + 1, chosen.len(), case.name, variants.len()));
+    let work = |case: &Case, variants: &[Variant]| variants.iter().map(|variant| cost(case, variant)).sum::<f64>();
+    let prepared: Vec<_> = chosen.iter().map(|case| (case, usable(case, options.quick))).collect();
+    let (mut left, mut done) = (prepared.iter().map(|(case, (variants, _))| work(case, variants)).sum::<f64>(), 0.0);
+    for (case, (variants, refused)) in prepared {
+        let rest = match report.cases[0] {
+            0 => String::new(),
+            _ => format!(", about {} left", minutes(begin.elapsed().as_secs_f64() * left / done)),
+        };
+        let place = report.cases[0] + 1;
+        watch(Step::Begins(&format!("{place} of {}: {}, {} rows{rest}", report.cases[1], case.name, variants.len())))?;
         report.refused.extend(refused);
-        report.rows.extend(measure_case(engine, case, variants, effort)?);
-        if case.name == ABLATED && !options.quick {
-            progress("each effect left out");
+        report.rows.extend(measure::case(engine, case, &variants, effort)?);
+        if case.name == WHOLE && !options.quick {
+            watch(Step::Begins("each effect left out"))?;
             report.ablation = ablation::measure(engine, &case.sequence, effort)?;
         }
+        pareto::mark_fronts(&mut report.rows);
+        report.violations = pareto::violations(&report.rows);
+        report.cases[0] = place;
+        report.elapsed_s = begin.elapsed().as_secs_f64();
+        watch(Step::Done(&report))?;
+        done += work(case, &variants);
+        left -= work(case, &variants);
     }
-    pareto::mark_fronts(&mut report.rows);
-    report.violations = pareto::violations(&report.rows);
-    report.elapsed_s = begin.elapsed().as_secs_f64();
     Ok(report)
 }
 
@@ -285,8 +164,22 @@ fn effort(quick: bool) -> Effort {
     use std::time::Duration;
     match quick {
         true => Effort { burst: 2, min_rounds: 3, max_rounds: 5, budget: Duration::from_secs(4) },
-        false => Effort { burst: 2, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(12) },
+        false => Effort { burst: 2, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(6) },
     }
+}
+
+/// How long a row takes compared with others, roughly: for the time that is left.
+fn cost(case: &Case, variant: &Variant) -> f64 {
+    let camera = &variant.sequence.scenario.camera;
+    let megapixels = camera.size_px.iter().map(|&side| f64::from(side)).product::<f64>() / 1e6;
+    let of_houses = if case.has_houses() { 3.0 } else { 1.0 };
+    let of_blur = if camera.shutter.exposure_ms > 0.0 { 2.0 } else { 1.0 };
+    megapixels * of_houses * of_blur
+}
+
+fn minutes(seconds: f64) -> String {
+    let seconds = seconds.round() as u64;
+    format!("{}:{:02} min", seconds / 60, seconds % 60)
 }
 
 /// The cases asked for, in their order; in the short form small, and if none is named a few.
@@ -327,44 +220,11 @@ fn usable(case: &Case, quick: bool) -> (Vec<Variant>, Vec<Refused>) {
     (usable, refused)
 }
 
-fn measure_case(engine: &Engine, case: &Case, variants: Vec<Variant>, effort: Effort) -> Result<Vec<Row>, BenchError> {
-    let timed: Vec<_> = variants.iter().map(|variant| (variant.sequence.clone(), false)).collect();
-    let times = rounds::measure(engine, &timed, effort)?;
-    let default = variants.iter().position(|variant| variant.knob == DEFAULT).map(|i| times[i].clone());
-    let mut truths: Vec<([u32; 2], Truth)> = Vec::new();
-    let mut rows = Vec::new();
-    for (variant, times) in variants.iter().zip(&times) {
-        let scenario = &variant.sequence.scenario;
-        let size_px = scenario.camera.size_px;
-        let truth = match truths.iter().position(|(size, _)| *size == size_px) {
-            Some(i) => &truths[i].1,
-            None => {
-                truths.push((size_px, Truth::new(&of_truth(&variant.sequence))?));
-                &truths[truths.len() - 1].1
-            }
-        };
-        let mut row = Row::empty(case.name, size_px);
-        row.knob = variant.knob.clone();
-        row.family = variant.family;
-        row.group = case.group.name();
-        row.preset = if scenario.quality.preset == Preset::Paper { "paper" } else { "default" };
-        row.set_times(times, default.as_ref());
-        row.set_errors(truth.errors(engine, &variant.sequence)?);
-        rows.push(row);
-    }
-    Ok(rows)
-}
-
-/// The sequence without anything that concerns how it is rendered.
-fn of_truth(sequence: &Arc<Sequence>) -> Arc<Sequence> {
-    let mut sequence = (**sequence).clone();
-    sequence.scenario.quality = Default::default();
-    Arc::new(sequence)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use knobs::DEFAULT;
+    use rounds::Times;
 
     fn row(case: &str, group: &'static str, knob: &str, ms: f64, rms_px: f64) -> Row {
         let times = Times { wall_ms: vec![ms; 3], ..Times::default() };
@@ -379,6 +239,7 @@ mod tests {
             adapter: "an adapter".into(),
             cpu_threads: 2,
             quick: false,
+            cases: [2, 2],
             rows: vec![
                 row("plane-30", "smooth", DEFAULT, 10.0, 0.01),
                 row("plane-30", "smooth", "rk2", 8.0, 0.1),

@@ -100,6 +100,14 @@ pub struct Case {
     pub sequence: Arc<Sequence>,
 }
 
+impl Case {
+    /// Whether anything stands on the ground.
+    #[must_use]
+    pub fn has_houses(&self) -> bool {
+        self.sequence.scene.meshes.len() + usize::from(self.sequence.scene.terrain.is_some()) > 1
+    }
+}
+
 /// What a case is made of.
 struct Recipe {
     name: &'static str,

@@ -61,11 +61,12 @@ impl Plot {
         let [x, y] = [0, 1].map(|axis| self.range(axis)).map(|range| range.ok_or_else(|| PlotError::Empty(self.title.clone())));
         let (x, y) = (x?, y?);
         let mut text = String::new();
+        let legend = self.emptiest_corner(&x, &y);
         let drawn = match self.log {
-            [false, false] => self.draw(&mut text, x, y),
-            [true, false] => self.draw(&mut text, x.log_scale(), y),
-            [false, true] => self.draw(&mut text, x, y.log_scale()),
-            [true, true] => self.draw(&mut text, x.log_scale(), y.log_scale()),
+            [false, false] => self.draw(&mut text, x, y, legend),
+            [true, false] => self.draw(&mut text, x.log_scale(), y, legend),
+            [false, true] => self.draw(&mut text, x, y.log_scale(), legend),
+            [true, true] => self.draw(&mut text, x.log_scale(), y.log_scale(), legend),
         };
         drawn.map_err(|reason| PlotError::Draw { title: self.title.clone(), reason })?;
         Ok(text)
@@ -91,7 +92,39 @@ impl Plot {
         Some(low - room..high + room)
     }
 
-    fn draw<X, Y>(&self, text: &mut String, x: X, y: Y) -> Result<(), String>
+    /// The corner where the legend hides least of the curves.
+    fn emptiest_corner(&self, x: &Range<f64>, y: &Range<f64>) -> SeriesLabelPosition {
+        let share = |value: f64, range: &Range<f64>, log: bool| match log {
+            false => (value - range.start) / (range.end - range.start),
+            true => (value / range.start).ln() / (range.end / range.start).ln(),
+        };
+        let mut places: Vec<(f64, f64)> = Vec::new();
+        for series in &self.series {
+            let points: Vec<_> = self.shown(series).map(|(u, v)| (share(u, x, self.log[0]), share(v, y, self.log[1]))).collect();
+            if series.joined {
+                // Along the lines too.
+                let between =
+                    |pair: &[(f64, f64)], k: f64| (pair[0].0 + k * (pair[1].0 - pair[0].0), pair[0].1 + k * (pair[1].1 - pair[0].1));
+                places.extend(points.windows(2).flat_map(|pair| [0.2, 0.4, 0.6, 0.8].map(|k| between(pair, k))));
+            }
+            places.extend(points);
+        }
+        let (width, height) = (0.4, 0.06 * self.series.len() as f64 + 0.05);
+        let hidden = |right: bool, top: bool| {
+            let inside = |at: f64, far: bool, size: f64| if far { at > 1.0 - size } else { at < size };
+            places.iter().filter(|(u, v)| inside(*u, right, width) && inside(*v, top, height)).count()
+        };
+        use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+        let corners = [
+            (hidden(true, true), UpperRight),
+            (hidden(true, false), LowerRight),
+            (hidden(false, true), UpperLeft),
+            (hidden(false, false), LowerLeft),
+        ];
+        corners.into_iter().min_by_key(|(count, _)| *count).map_or(UpperRight, |(_, corner)| corner)
+    }
+
+    fn draw<X, Y>(&self, text: &mut String, x: X, y: Y, legend: SeriesLabelPosition) -> Result<(), String>
     where
         X: AsRangedCoord<Value = f64>,
         Y: AsRangedCoord<Value = f64>,
@@ -135,7 +168,7 @@ impl Plot {
             .configure_series_labels()
             .background_style(WHITE.mix(0.85))
             .border_style(BLACK.mix(0.3))
-            .position(SeriesLabelPosition::UpperRight)
+            .position(legend)
             .draw()
             .map_err(said)?;
         root.present().map_err(said)
@@ -158,5 +191,13 @@ mod tests {
         assert!(svg.contains("curve &lt;1&gt;"));
         assert!(matches!(plot(vec![(0.0, 1.0)], [true, false]).svg(), Err(PlotError::Empty(_))));
         assert!(plot(vec![(0.0, 1.0)], [false, false]).svg().is_ok());
+    }
+
+    #[test]
+    fn the_legend_stays_off_the_curve() {
+        let corner = |points: &[(f64, f64)], log| plot(points.to_vec(), log).emptiest_corner(&(1.0..100.0), &(1.0..100.0));
+        assert!(matches!(corner(&[(1.0, 100.0), (100.0, 1.0)], [false; 2]), SeriesLabelPosition::UpperRight));
+        assert!(matches!(corner(&[(1.0, 1.0), (100.0, 100.0)], [true; 2]), SeriesLabelPosition::LowerRight));
+        assert!(matches!(corner(&[(1.0, 1.0), (100.0, 1.0), (100.0, 100.0)], [false; 2]), SeriesLabelPosition::UpperLeft));
     }
 }

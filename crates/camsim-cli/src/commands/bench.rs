@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use camsim_gpu::{AdapterChoice, Engine};
-use camsim_lab::bench::{BenchError, Options, Report, run as measure};
+use camsim_lab::bench::{BenchError, Options, Report, Step, run as measure};
 
 use crate::{
     console::Console,
@@ -16,6 +16,7 @@ use crate::{
 ///
 /// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the exact reference: of source
 /// coordinates in pixels, and of pictures in dB. The whole takes about ten minutes on two processor cores without a GPU, --quick less than one.
+/// Files are written after each case, so that an interrupted run leaves what it has measured; there is no resuming.
 /// Rows: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px, coord_max_px, psnr_db,
 /// predicted_px, and more behind them; null is what was not measured.
 #[derive(Debug, clap::Args)]
@@ -54,23 +55,17 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let options = Options { cases: args.cases.clone(), quick: args.quick };
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("adapter: {}", engine.gpu().adapter));
-    let report = measure(&engine, &options, &mut |step| console.note(step)).map_err(failure)?;
     if let Some(folder) = &args.output {
         std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display())).or_failed()?;
-        write(&folder.join("bench.md"), &report.markdown(), console)?;
-        write(&folder.join("bench.json"), &json(&report)?, console)?;
     }
-    let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
-    for path in [args.csv.clone(), beside("bench.csv")].into_iter().flatten() {
-        write(&path, &report.csv(), console)?;
-    }
-    let plots: Vec<_> = [args.plot.clone(), beside("bench.svg")].into_iter().flatten().collect();
-    if !plots.is_empty() {
-        let plot = report.plot().map_err(failure)?;
-        for path in plots {
-            write(&path, &plot, console)?;
+    let report = measure(&engine, &options, &mut |step| match step {
+        Step::Begins(what) => {
+            console.note(what);
+            Ok(())
         }
-    }
+        // What is done is kept if a later case is interrupted.
+        Step::Done(report) => files(args, report, console),
+    })?;
     if args.json {
         console.print(&json(&report)?)?;
     } else {
@@ -85,6 +80,24 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
 }
 
+/// Every file that was asked for, each whole.
+fn files(args: &Args, report: &Report, console: &mut Console<'_>) -> Result<(), Failure> {
+    let beside = |name: &str| args.output.as_ref().map(|folder| folder.join(name));
+    if let Some(path) = beside("bench.md") {
+        write(&path, &report.markdown(), console)?;
+    }
+    if let Some(path) = beside("bench.json") {
+        write(&path, &json(report)?, console)?;
+    }
+    for path in [args.csv.clone(), beside("bench.csv")].into_iter().flatten() {
+        write(&path, &report.csv(), console)?;
+    }
+    for path in [args.plot.clone(), beside("bench.svg")].into_iter().flatten() {
+        write(&path, &report.plot()?, console)?;
+    }
+    Ok(())
+}
+
 fn json(report: &Report) -> Result<String, Failure> {
     let mut text = serde_json::to_string_pretty(report).or_failed()?;
     text.push('\n');
@@ -95,11 +108,13 @@ fn write(path: &Path, text: &str, console: &mut Console<'_>) -> Result<(), Failu
     write_output(Some(path), console, |out| out.write_all(text.as_bytes()))
 }
 
-fn failure(error: BenchError) -> Failure {
-    match error {
-        BenchError::NoSuchCase { .. } => Failure::bad_input(error),
-        BenchError::Render(error) => error.into(),
-        BenchError::Gpu(error) => error.into(),
-        error => Failure::failed(error),
+impl From<BenchError> for Failure {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::NoSuchCase { .. } => Self::bad_input(error),
+            BenchError::Render(error) => error.into(),
+            BenchError::Gpu(error) => error.into(),
+            error => Self::failed(error),
+        }
     }
 }

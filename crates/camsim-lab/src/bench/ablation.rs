@@ -128,7 +128,7 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
     }
     names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());
     variants.push((without(full, &EFFECTS)?, true));
-    let times = rounds::measure(engine, &variants, effort)?;
+    let times: Vec<Times> = rounds::measure(engine, &variants, effort)?.into_iter().map(|measured| measured.times).collect();
     let mut rows: Vec<_> = names.into_iter().zip(&times).map(|(name, own)| row(name, own, Some(&times[0]))).collect();
     let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, times[0].wall_ms.len().max(3), effort.burst)?;
     rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None));

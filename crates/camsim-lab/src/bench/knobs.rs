@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     plan::Planner,
-    scenario::{Auto, Channel, Preset, Scenario, Solver},
+    scenario::{Auto, Channel, LensModel, Preset, Scenario, Solver},
     sequence::Sequence,
 };
 
@@ -12,6 +12,10 @@ use crate::cases::{Case, Group};
 
 /// Name of the row that every other row of its case is compared with.
 pub const DEFAULT: &str = "auto 0.05 px";
+/// The case with every effect; its frames take long, and it has fewer rows of each kind.
+pub const WHOLE: &str = "all-effects";
+/// The case whose size is varied.
+const SIZED: &str = "blender-plane";
 /// Largest texture side that the plan behind a rule of samples assumes.
 const MAX_SIDE_PX: u32 = 16_384;
 
@@ -63,36 +67,47 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     if !matches!(case.group, Group::Lens | Group::Exposure) {
         row("linear", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Linear));
         row("rk2", Family::Solver, &|scenario| scenario.quality.solver = Auto::Value(Solver::Rk2));
-        for look_ups in if quick { 2..=2 } else { 1..=3 } {
-            row(&format!("reproject x{look_ups}"), Family::Solver, &|scenario| scenario.quality.iterations = Auto::Value(look_ups));
+        // Over smooth ground each look-up shows; with houses the error is at silhouettes. The whole camera's frames take seconds.
+        let look_ups: &[u32] = match (quick, case.name, case.has_houses()) {
+            (true, ..) => &[2],
+            (_, WHOLE, _) => &[],
+            (.., true) => &[1, 2],
+            (.., false) => &[1, 2, 3],
+        };
+        for look_ups in look_ups {
+            row(&format!("reproject x{look_ups}"), Family::Solver, &|scenario| scenario.quality.iterations = Auto::Value(*look_ups));
         }
     }
     if quick {
         return rows;
     }
-    let houses = case.sequence.scene.meshes.len() + usize::from(case.sequence.scene.terrain.is_some()) > 1;
-    if houses {
-        for keys in [2, 3] {
-            row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| scenario.quality.key_frames = Auto::Value(keys));
+    if case.has_houses() {
+        if matches!(case.group, Group::Buildings | Group::LongWindow | Group::AllEffects) {
+            for keys in [2, 3] {
+                row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| scenario.quality.key_frames = Auto::Value(keys));
+            }
         }
-        row("silhouettes: 1 sample", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 20.0);
-        row("silhouettes: 16 samples", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 0.5);
+        if matches!(case.group, Group::Buildings | Group::AllEffects) {
+            row("silhouettes: 1 sample", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 20.0);
+            row("silhouettes: 16 samples", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 0.5);
+        }
     }
     if matches!(case.group, Group::Exposure | Group::AllEffects)
         && let Some(rule) = blur_rule(&case.sequence)
     {
-        for times in [0.25, 0.5, 1.0, 2.0] {
+        for times in if case.name == WHOLE { &[0.5, 2.0][..] } else { &[0.25, 0.5, 1.0, 2.0] } {
             let samples = (f64::from(rule) * times).ceil().max(1.0) as u32;
             let name = format!("blur: {samples} samples ({times} x)");
             row(&name, Family::Blur, &|scenario| scenario.quality.blur_samples = Auto::Value(samples));
         }
     }
-    if matches!(case.group, Group::Lens | Group::AllEffects) {
-        for taps in [1, 2, 4] {
-            row(&format!("taps: {taps} x {taps}"), Family::Taps, &|scenario| scenario.quality.footprint_taps = Auto::Value(taps));
+    // Without a lens nothing is minified.
+    if case.sequence.scenario.camera.lens.model != LensModel::Pinhole {
+        for taps in if case.name == WHOLE { &[1, 2][..] } else { &[1, 2, 4] } {
+            row(&format!("taps: {taps} x {taps}"), Family::Taps, &|scenario| scenario.quality.footprint_taps = Auto::Value(*taps));
         }
     }
-    if case.name == "all-effects" {
+    if case.name == SIZED {
         for size_px in [[320, 240], [1280, 960], [1920, 1080]] {
             let [width, height] = size_px;
             row(&format!("{width}x{height}"), Family::Size, &|scenario| resize(scenario, size_px));

@@ -3,9 +3,11 @@
 use serde::Serialize;
 
 use super::{Row, knobs::Family};
+use crate::timing::quantile;
 
-/// Times differ if three quarters of the rounds say so, by this factor.
+/// Times differ if nine tenths of the rounds say so, by this factor: of three rounds, about all.
 const SLOWER: f64 = 1.02;
+const ROUNDS: f64 = 0.9;
 /// Errors differ by this factor, and by more than single precision leaves, px.
 const WORSE: f64 = 1.1;
 const FLOOR_PX: f64 = 2e-4;
@@ -24,24 +26,24 @@ pub struct Violation {
     /// Time of the first over the second, median of the rounds.
     pub time_ratio: f64,
     /// RMS of the source coordinates, first and second, px.
-    pub coord_rms_px: [f64; 2],
+    pub coord_rms_px: [Option<f64>; 2],
+    /// 99th percentile away from silhouettes, first and second, px.
+    pub smooth_p99_px: [Option<f64>; 2],
     /// PSNR, first and second, dB.
     pub psnr_db: [Option<f64>; 2],
 }
 
 /// Marks the rows that no other row of their case and size beats in both time and error: `coord_front` by the RMS of the source
-/// coordinates, `image_front` by PSNR.
+/// coordinates, `image_front` by PSNR. Times are compared within the rounds that two rows have in common.
 pub fn mark_fronts(rows: &mut [Row]) {
     let fronts: Vec<[bool; 2]> = rows
         .iter()
         .map(|row| {
             let free = |error: fn(&Row) -> Option<f64>| {
                 error(row).is_some_and(|own| {
-                    !rows.iter().any(|other| {
-                        comparable(row, other)
-                            && other.ms_per_frame_p50 <= row.ms_per_frame_p50
-                            && error(other)
-                                .is_some_and(|error| error < own || (error <= own && other.ms_per_frame_p50 < row.ms_per_frame_p50))
+                    !rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob).any(|other| {
+                        let [_, time, _] = other.times.ratio_to(&row.times);
+                        time <= 1.0 && error(other).is_some_and(|error| error < own || (error <= own && time < 1.0))
                     })
                 })
             };
@@ -58,26 +60,53 @@ fn comparable(a: &Row, b: &Row) -> bool {
     a.case == b.case && [a.width, a.height] == [b.width, b.height]
 }
 
-/// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger coordinate error and no
-/// better picture.
+/// How one figure of two rows compares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Than {
+    Better,
+    Alike,
+    Worse,
+}
+
+/// The coordinates of `other` than those of `row`, by one figure; alike where it is not known of both.
+fn coords_than(other: &Row, row: &Row, figure: fn(&Row) -> Option<f64>) -> Than {
+    match (figure(other), figure(row)) {
+        (Some(other), Some(row)) if row > WORSE * other + FLOOR_PX => Than::Better,
+        (Some(other), Some(row)) if other > WORSE * row + FLOOR_PX => Than::Worse,
+        _ => Than::Alike,
+    }
+}
+
+/// The same of the pictures.
+fn picture_than(other: &Row, row: &Row) -> Than {
+    match (other.psnr_db, row.psnr_db) {
+        (Some(other), Some(row)) if other > row + WORSE_DB => Than::Better,
+        (Some(other), Some(row)) if other < row - WORSE_DB => Than::Worse,
+        _ => Than::Alike,
+    }
+}
+
+/// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger error: of all coordinates (RMS), of
+/// those away from silhouettes (99th percentile) or of the picture, and no smaller one of the others. A row that has the plans of one above it is that row.
 #[must_use]
 pub fn violations(rows: &[Row]) -> Vec<Violation> {
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.same_as.is_none()).collect();
     let mut found = Vec::new();
     for row in rows.iter().filter(|row| row.family == Family::Tolerance) {
         for other in rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob) {
-            let (Some(own_px), Some(other_px)) = (row.coord_rms_px, other.coord_rms_px) else { continue };
-            let [low, median, _] = row.times.ratio_to(&other.times);
-            let worse_picture = match (row.psnr_db, other.psnr_db) {
-                (Some(own), Some(other)) => own <= other + WORSE_DB,
-                _ => true,
-            };
-            if low > SLOWER && own_px > WORSE * other_px + FLOOR_PX && worse_picture {
+            let ratios = row.times.ratios(&other.times);
+            let [least, median] = [1.0 - ROUNDS, 0.5].map(|part| quantile(&ratios, part));
+            let all = coords_than(other, row, |row| row.coord_rms_px);
+            let smooth = coords_than(other, row, |row| row.smooth_p99_px);
+            let than = [all, smooth, picture_than(other, row)];
+            if least > SLOWER && than.contains(&Than::Better) && !than.contains(&Than::Worse) {
                 found.push(Violation {
                     case: row.case.clone(),
                     row: row.knob.clone(),
                     better: other.knob.clone(),
                     time_ratio: median,
-                    coord_rms_px: [own_px, other_px],
+                    coord_rms_px: [row.coord_rms_px, other.coord_rms_px],
+                    smooth_p99_px: [row.smooth_p99_px, other.smooth_p99_px],
                     psnr_db: [row.psnr_db, other.psnr_db],
                 });
             }
@@ -117,7 +146,14 @@ mod tests {
         assert!(names(&[row("forced", Family::Solver, [20.0, 22.0, 21.0], 0.05, 45.0), better.clone()]).is_empty());
         let mut larger = better.clone();
         larger.width = 1280;
-        assert!(names(&[auto, larger]).is_empty());
+        assert!(names(&[auto.clone(), larger]).is_empty());
+        // Fewer samples for a better picture, coordinates not looked at; and the same plan under another name.
+        let sharper = Row { coord_rms_px: None, ..row("sharper", Family::Blur, [10.0, 11.0, 10.0], 0.0, 45.5) };
+        assert_eq!(names(&[auto.clone(), sharper.clone()]), ["sharper"]);
+        let smoother = Row { smooth_p99_px: Some(1e-4), ..row("smoother", Family::Solver, [10.0, 11.0, 10.0], 0.05, 45.0) };
+        assert_eq!(names(&[Row { smooth_p99_px: Some(2e-3), ..auto.clone() }, smoother]), ["smoother"]);
+        let also = Row { knob: "also auto".into(), same_as: Some("auto".into()), ..auto.clone() };
+        assert_eq!(names(&[auto, also, sharper]), ["sharper"]);
     }
 
     #[test]

@@ -33,6 +33,9 @@ impl Report {
             if self.quick { " --quick" } else { "" },
             self.elapsed_s
         )?;
+        if self.cases[0] < self.cases[1] {
+            writeln!(text, "\nNot complete: {} of {} cases.", self.cases[0], self.cases[1])?;
+        }
         for rows in self.rows.chunk_by(|a, b| a.case == b.case) {
             self.case(text, rows)?;
         }
@@ -58,10 +61,14 @@ impl Report {
         let about = self.about.get(&first.case).copied().unwrap_or_default();
         writeln!(text, "\n### {}: {about}\n", first.case)?;
         let [coords, picture] = first.compared;
+        let rendered = rows.iter().filter(|row| row.same_as.is_none());
+        let rounds = rendered.clone().map(|row| row.rounds).min().zip(rendered.clone().map(|row| row.rounds).max());
         write!(
             text,
             "{}x{}, {} rounds; errors over {coords} coordinates and {picture} pixels of the picture",
-            first.width, first.height, first.rounds
+            first.width,
+            first.height,
+            rounds.map_or(String::new(), |(least, most)| if least == most { most.to_string() } else { format!("{least} to {most}") }),
         )?;
         match first.edge_share.filter(|share| *share > 0.0) {
             Some(share) => writeln!(text, ", {:.1} % of the frame within 3 px of a silhouette.\n", 100.0 * share)?,
@@ -72,7 +79,9 @@ impl Report {
             "| method | ms a frame | p99 | processor ms | to default | RMS px | p99 px | max px | away from silhouettes p99 px | predicted px | PSNR dB | at silhouettes dB | front |"
         )?;
         writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|---|---|")?;
-        for row in rows {
+        for row in rendered {
+            let alike = rows.iter().filter(|other| other.same_as.as_ref() == Some(&row.knob)).map(|other| other.knob.as_str());
+            let names = [row.knob.as_str()].into_iter().chain(alike).collect::<Vec<_>>().join("; ");
             let front = match (row.coord_front, row.image_front) {
                 (true, true) => "both",
                 (true, false) => "coordinates",
@@ -81,8 +90,7 @@ impl Report {
             };
             writeln!(
                 text,
-                "| {} | {:.1} | {:.1} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {front} |",
-                row.knob,
+                "| {names} | {:.1} | {:.1} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {front} |",
                 row.ms_per_frame_p50,
                 row.ms_per_frame_p99,
                 decimal(row.cpu_ms_per_frame),
@@ -126,16 +134,13 @@ impl Report {
             writeln!(text, "Of the rows that the plan chose, none is beaten by another row of its case in both time and error.")?;
         }
         for violation in &self.violations {
-            let [own, better] = violation.coord_rms_px;
+            let [own_px, better_px] = violation.coord_rms_px.map(pixels);
+            let [own_p99_px, better_p99_px] = violation.smooth_p99_px.map(pixels);
+            let [own_db, better_db] = violation.psnr_db.map(decimal);
             writeln!(
                 text,
-                "- {}: {} takes {:.2} times the time of {} for {} px RMS against {}",
-                violation.case,
-                violation.row,
-                violation.time_ratio,
-                violation.better,
-                pixels(Some(own)),
-                pixels(Some(better)),
+                "- {}: {} takes {:.2} times the time of {} for {own_px} px RMS against {better_px}, {own_p99_px} px away from silhouettes (99 %) against {better_p99_px}, {own_db} dB against {better_db}",
+                violation.case, violation.row, violation.time_ratio, violation.better,
             )?;
         }
         writeln!(text, "\n### What was promised\n\n| promise | measured | kept |\n|---|---|---|")?;
@@ -194,13 +199,15 @@ impl Report {
         let all: Vec<_> = self.rows.iter().filter_map(|row| Some((row, over(row)?))).collect();
         worst("measured p99 over the predicted bound: at most 1", 1.0, true, "", all);
         worst("all effects: at least 45 dB", 45.0, false, " dB", of(&[AllEffects], DEFAULT, &|row| row.psnr_db));
-        worst(
-            "all effects: at least 40 dB within 3 px of silhouettes",
-            40.0,
-            false,
-            " dB",
-            of(&[AllEffects], "silhouettes: 16 samples", &|row| row.edge_psnr_db),
-        );
+        for (what, knob) in [("", DEFAULT), (", 16 samples a pixel there", "silhouettes: 16 samples")] {
+            worst(
+                &format!("all effects: at least 40 dB within 3 px of silhouettes{what}"),
+                40.0,
+                false,
+                " dB",
+                of(&[AllEffects], knob, &|row| row.edge_psnr_db),
+            );
+        }
         self.ablation_promises(&mut promises);
         promises
     }
@@ -220,7 +227,7 @@ impl Report {
     #[must_use]
     pub fn csv(&self) -> String {
         let mut text = String::from(
-            "case,preset,width,height,ms_per_frame_p50,ms_per_frame_p99,cpu_ms_per_frame,coord_rms_px,coord_p99_px,coord_max_px,psnr_db,predicted_px,knob,group,edge_psnr_db,smooth_rms_px,smooth_p99_px,edge_share,falsely_valid,missing,coord_front,image_front,rounds\n",
+            "case,preset,width,height,ms_per_frame_p50,ms_per_frame_p99,cpu_ms_per_frame,coord_rms_px,coord_p99_px,coord_max_px,psnr_db,predicted_px,knob,same_as,group,edge_psnr_db,smooth_rms_px,smooth_p99_px,edge_share,falsely_valid,missing,coord_front,image_front,rounds\n",
         );
         let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6e}"));
         for row in &self.rows {
@@ -238,6 +245,7 @@ impl Report {
                 number(row.psnr_db),
                 number(row.predicted_px),
                 format!("\"{}\"", row.knob),
+                row.same_as.as_ref().map_or(String::new(), |knob| format!("\"{knob}\"")),
                 row.group.to_owned(),
                 number(row.edge_psnr_db),
                 number(row.smooth_rms_px),
@@ -315,7 +323,7 @@ impl Report {
         format!(
             "{} rows of {} cases in {:.0} s; opening a session takes {:.1} s (median); {} rows are dominated",
             self.rows.len(),
-            self.about.len(),
+            self.cases[0],
             self.elapsed_s,
             quantile(&starts, 0.5),
             self.violations.len()

@@ -101,7 +101,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     }
     report.pictures.push(Picture {
         name: "fig19",
-        caption: "Fig. 19, row by row: to the right (shear), upwards (shortening), downwards (elongation); still camera, the paper's method, camsim. \
+        caption: "Fig. 19, row by row: to the right (shear), upwards (elongation), downwards (shortening); still camera, the paper's method, camsim. \
                   The paper's method loses a rim of the target wherever depth is read in the sky."
             .into(),
         frames: fig19,
