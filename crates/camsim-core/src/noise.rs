@@ -153,4 +153,68 @@ mod tests {
             assert!((sum / 90_000.0).abs() < 5.0 / 300.0, "{sums:?}");
         }
     }
+
+    /// In place, unnormalised; the length is a power of two.
+    fn fourier(values: &mut [[f64; 2]]) {
+        let n = values.len();
+        for i in 0..n {
+            let j = i.reverse_bits() >> (usize::BITS - n.trailing_zeros());
+            if i < j {
+                values.swap(i, j);
+            }
+        }
+        let mut half = 1;
+        while half < n {
+            for start in (0..n).step_by(2 * half) {
+                for k in 0..half {
+                    let (sin, cos) = (-std::f64::consts::PI * k as f64 / half as f64).sin_cos();
+                    let (a, b) = (values[start + k], values[start + half + k]);
+                    let turned = [b[0] * cos - b[1] * sin, b[0] * sin + b[1] * cos];
+                    values[start + k] = [a[0] + turned[0], a[1] + turned[1]];
+                    values[start + half + k] = [a[0] - turned[0], a[1] - turned[1]];
+                }
+            }
+            half *= 2;
+        }
+    }
+
+    /// Largest power of a plane of bits at any frequency but 0, in its mean power: exponentially distributed for true noise.
+    fn strongest_wave(bit: impl Fn(u32, u32) -> bool) -> f64 {
+        const SIDE: usize = 64;
+        let mut rows: Vec<Vec<[f64; 2]>> =
+            (0..SIDE as u32).map(|y| (0..SIDE as u32).map(|x| [if bit(x, y) { 1.0 } else { -1.0 }, 0.0]).collect()).collect();
+        rows.iter_mut().for_each(|row| fourier(row));
+        let mut strongest = 0.0_f64;
+        for x in 0..SIDE {
+            let mut column: Vec<[f64; 2]> = rows.iter().map(|row| row[x]).collect();
+            fourier(&mut column);
+            for ([re, im], y) in column.into_iter().zip(0..) {
+                // Where the plane's wave is its own mirror image all its power is in one number: half as much on average counts the same.
+                let real = x % (SIDE / 2) == 0 && y % (SIDE / 2) == 0;
+                let power = (re * re + im * im) / (SIDE * SIDE) as f64;
+                if (x, y) != (0, 0) {
+                    strongest = strongest.max(if real { 0.5 * power } else { power });
+                }
+            }
+        }
+        strongest
+    }
+
+    #[test]
+    fn no_bit_plane_that_is_used_has_a_pattern() {
+        // 96 planes of 4096 frequencies: the strongest of them is above 27 once in a million times (4e5 exp(-27) = 7e-7).
+        const LIMIT: f64 = 27.0;
+        let wave = |lane: usize, bit: u32| {
+            let key = |x: u32, y: u32| [x | (y << 16), 7, 12, NOISE_STREAM.wrapping_mul(0x9e37_79b9)];
+            strongest_wave(|x, y| pcg4d(key(x, y))[lane] >> bit & 1 == 1)
+        };
+        for lane in 0..4 {
+            for bit in 8..32 {
+                let found = wave(lane, bit);
+                assert!(found < LIMIT, "lane {lane} bit {bit}: {found}");
+            }
+            // The low bits, which are not used, do have one.
+            assert!(wave(lane, 1) > 2.0 * LIMIT, "lane {lane}: {}", wave(lane, 1));
+        }
+    }
 }

@@ -14,7 +14,6 @@ use crate::{
     mount::CameraPath,
     pose::CameraPose,
     scenario::{Channel, Preset},
-    scene::Scene,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
     temporal::{IdealGeometry, TapStage, displacement::Twist},
@@ -34,6 +33,7 @@ mod motion;
 pub mod paper;
 mod probes;
 mod rounding;
+mod surfaces;
 mod transfer;
 
 pub use bounds::LensReach;
@@ -227,6 +227,7 @@ pub struct Planner {
     fixed: Option<Arc<LensReach>>,
     outline: edges::SceneOutline,
     grain: grain::SceneGrain,
+    surfaces: surfaces::Surfaces,
     truth: bool,
     max_side_px: u32,
 }
@@ -247,7 +248,8 @@ impl Planner {
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let outline = edges::SceneOutline::new(&sequence.scene);
         let grain = grain::SceneGrain::new(&sequence.scene);
-        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, truth, max_side_px })
+        let surfaces = surfaces::Surfaces::new(sequence.scene.clone());
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px })
     }
 
     /// The sequence.
@@ -300,14 +302,14 @@ impl Planner {
         let demanded = forced::temporal_stage(quality);
         let is_paper = quality.preset == Preset::Paper;
         let geometry = |keys: &[KeyFrame], scale: f64, displaced: Option<(TemporalStage, Twist)>| {
-            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, scene, displaced, scale)
+            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced, scale)
         };
         let displaced = demanded.map(|stage| (stage, key_twist));
         let one_key = keys::spread(path, window_s, 1);
         let least_scale = reach.least_scale();
         let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale, displaced) };
-        let prospect = levels::Prospect::new(&reach, &self.sequence, &self.grain, &self.shutter, stamp_s, &key_pose);
-        let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, scene);
+        let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
+        let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, &self.surfaces);
         let nodes_of = |motion: &Motion, ideal: &IdealGeometry, skipped: &mut Vec<Skip>| {
             motion::exposure_nodes(motion, quality, &reach, path, &self.shutter, stamp_s, ideal, skipped)
         };
@@ -356,6 +358,7 @@ impl Planner {
             straight_blur: blur.map(|_| sampling.blur_stage(2, quality, motion.blur_px)),
             expected,
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
+            surfaces: &self.surfaces,
         };
         let error::Choice { way, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         let error::Way { temporal, blur } = way;
@@ -460,15 +463,6 @@ impl IdealGeometry {
         let high = (size - 0.5 - self.principal_px) / self.focal_px;
         [low.x, high.x, low.y, high.y]
     }
-}
-
-/// Lower bound of the planar depth of anything in view, metres; infinite with nothing in view.
-fn nearest_m(scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> f64 {
-    let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
-    let terrain = scene.terrain.as_ref().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
-    let meshes = scene.meshes.iter().map(|mesh| mesh.min_distance_m(pose.position_ned_m)).fold(f64::INFINITY, f64::min);
-    // Slant range to planar depth by the widest ray; the camera may come closer within the window.
-    ((terrain.min(meshes) - travel_m) / (1.0 + r2).sqrt()).max(2.0 * NEAR_M)
 }
 
 /// Line axis and the number of pose-table fields (2 where sideways readout meets interlacing).

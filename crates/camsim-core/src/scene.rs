@@ -3,6 +3,7 @@
 //! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so that the renderer can form
 //! camera-relative coordinates without cancellation.
 
+pub(crate) mod box_tree;
 pub mod mesh;
 pub mod terrain;
 pub mod texture;

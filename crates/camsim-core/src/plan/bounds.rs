@@ -7,11 +7,11 @@ use glam::DVec2;
 use super::{
     KeyFrame, TemporalStage,
     probes::{Probe, probes},
+    surfaces::Surfaces,
 };
 use crate::{
     camera::CameraModel,
     mount::CameraPath,
-    scene::Scene,
     shutter::Shutter,
     temporal::{IdealGeometry, displacement::Twist},
 };
@@ -127,7 +127,7 @@ pub(super) fn ideal_geometry(
     stamp_s: f64,
     key_s: f64,
     keys: &[KeyFrame],
-    scene: &Scene,
+    surfaces: &Surfaces,
     demanded: Option<(TemporalStage, Twist)>,
     scale: f64,
 ) -> IdealGeometry {
@@ -137,7 +137,7 @@ pub(super) fn ideal_geometry(
     let travel_m = super::travel_m(path, [stamp_s + first, stamp_s + last], key_s);
     let slant = reach.slant();
     let tangents = still_tangents(reach, slant);
-    let inverse_near = 1.0 / super::nearest_m(scene, &key, tangents, travel_m);
+    let inverse_near = 1.0 / surfaces.nearest_m(&key, tangents, travel_m);
     let mut low = DVec2::splat(f64::INFINITY);
     let mut high = DVec2::splat(f64::NEG_INFINITY);
     let last_row = reach.camera.size_px[1] - 1;

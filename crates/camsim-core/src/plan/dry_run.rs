@@ -3,11 +3,15 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::{TemporalStage, probes::Probe};
+use super::{
+    TemporalStage,
+    probes::Probe,
+    surfaces::{Met, Surfaces},
+};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
-    scene::{ChunkDraw, LodSelection, Scene, Terrain, TerrainHit},
+    scene::{LodSelection, TerrainHit},
     shutter::Shutter,
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
 };
@@ -23,32 +27,40 @@ const HIDDEN: f64 = 1e-3;
 /// A frame to be tried.
 #[derive(Clone, Copy)]
 pub(super) struct Trial<'a> {
-    pub scene: &'a Scene,
+    pub surfaces: &'a Surfaces,
     pub path: &'a CameraPath,
     pub shutter: &'a Shutter,
     pub stamp_s: f64,
     pub key_s: f64,
     pub key_pose: &'a CameraPose,
     pub ideal: &'a IdealGeometry,
-    /// The terrain as it will be drawn.
-    pub lod: &'a LodSelection,
     /// Motion of the camera at the key instant, for the paper's models.
     pub twist: Twist,
     /// Whether these read the nearest texel's depth.
     pub nearest_depth: bool,
 }
 
-/// How far each way of solving looks from the truth, ideal pixels.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Outcome {
+/// Where a probe truly looks.
+#[derive(Clone, Copy)]
+pub(super) struct Truth {
     /// Instant, path time.
     pub t_s: f64,
-    /// True source.
+    /// Source.
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
     pub inverse_depth: f64,
     /// The same of the key camera; 0 = sky.
     pub key_inverse_depth: f64,
+    /// The ray in the key camera, its z left as it is, and what an inverse depth of 1 adds to it.
+    in_key: (DMat3, DVec3),
+    direction: DVec3,
+    /// What the key camera sees at the source.
+    seen: Option<Met>,
+}
+
+/// How far each way of solving looks from the truth, ideal pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Outcome {
     /// One pose for all lines.
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
@@ -57,8 +69,6 @@ pub(super) struct Outcome {
     pub of_mid: [f64; MAX_LOOK_UPS + 1],
     /// The part of it that more look-ups would mend.
     pub unsettled: [f64; MAX_LOOK_UPS + 1],
-    /// What the level of detail moves the source by.
-    pub level_of_detail_px: f64,
     /// Equation 16 and equation 18.
     pub linear_px: f64,
     pub rk2_px: f64,
@@ -66,76 +76,75 @@ pub(super) struct Outcome {
     pub parallax_px: f64,
 }
 
-/// Where a ray first meets something.
-#[derive(Clone, Copy)]
-struct Met {
-    /// Planar depth for a direction with z = 1 in its camera.
-    depth_m: f64,
-    terrain: Option<TerrainHit>,
-}
-
 /// The key frame's depth, texel by texel, found when asked for.
 struct KeyDepth<'a> {
     trial: &'a Trial<'a>,
+    /// The terrain as it will be drawn.
+    lod: &'a LodSelection,
     known: Vec<([i64; 2], f64)>,
 }
 
 impl Trial<'_> {
-    /// Runs one probe at an instant of its exposure (-0.5 to 0.5); `None` where its ray has no source in the ideal frame.
-    pub fn run(&self, probe: &Probe, phase: f64) -> Option<Outcome> {
+    /// Where one probe looks at an instant of its exposure (-0.5 to 0.5); `None` where its ray has no source in the ideal frame.
+    pub fn look(&self, probe: &Probe, phase: f64) -> Option<Truth> {
         let t_s = self.instant_s(probe, phase + 0.5);
         let pose = self.path.pose(t_s);
         let (rotation, shift) = pose.relative_to(self.key_pose);
         let direction = rotation * probe.uv.extend(1.0);
-        let met = meet(self.scene, pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
-        let w = met.map_or(0.0, |met| 1.0 / met.depth_m);
-        let in_key = direction + w * shift;
-        let truth_px = self.ideal.px_from_point(in_key);
-        if in_key.z <= 0.0 || !self.ideal.contains(truth_px) {
+        let met = self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
+        let inverse_depth = met.map_or(0.0, |met| 1.0 / met.depth_m);
+        let point = direction + inverse_depth * shift;
+        let at_px = self.ideal.px_from_point(point);
+        if point.z <= 0.0 || !self.ideal.contains(at_px) {
             return None;
         }
-        let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth_px) } else { f64::INFINITY };
-        let rotated_px = self.ideal.px_from_point(direction);
-        let mut outcome = Outcome {
+        Some(Truth {
             t_s,
-            at_px: truth_px,
-            inverse_depth: w,
-            key_inverse_depth: w / in_key.z,
-            still_px: off(self.ideal.px_from_point(probe.uv.extend(1.0))),
-            parallax_px: off(rotated_px),
-            ..Outcome::default()
-        };
-        let mut depth = KeyDepth { trial: self, known: Vec::with_capacity(16) };
-        let places = settle(probe.uv, (rotation, shift), self.ideal, &mut depth);
+            at_px,
+            inverse_depth,
+            key_inverse_depth: inverse_depth / point.z,
+            in_key: (rotation, shift),
+            direction,
+            seen: self.surfaces.meet(self.key_pose.position_ned_m, self.key_ray(at_px)),
+        })
+    }
+
+    /// What each way of solving makes of a probe.
+    pub fn run(&self, probe: &Probe, truth: &Truth, lod: &LodSelection) -> Outcome {
+        let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth.at_px) } else { f64::INFINITY };
+        // Where the pixel itself would look: one pose for all lines. The paper's models read the depth there.
+        let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
+        let mut outcome =
+            Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
+        let mut depth = KeyDepth { trial: self, lod, known: Vec::with_capacity(16) };
+        let places = settle(probe.uv, truth.in_key, self.ideal, &mut depth);
         outcome.after = places.map(off);
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
-        outcome.of_mid = if phase == 0.0 {
-            outcome.after
-        } else {
-            let mid = self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose);
-            let looked_at = settle(probe.uv, mid, self.ideal, &mut depth);
-            std::array::from_fn(|n| match n.checked_sub(1) {
-                None => outcome.parallax_px,
-                Some(last) => {
-                    let found = depth.inverse_depth(looked_at[last]);
-                    let w = depth_on_line(direction, shift, found).unwrap_or(0.0);
-                    off(self.ideal.px_from_point(direction + w * shift))
-                }
-            })
-        };
-        let dt_s = t_s - self.key_s;
-        // The paper's models read the depth at the ray's own place.
-        let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
-        let w = depth.inverse_depth(if self.nearest_depth { own_px.round() } else { own_px });
+        outcome.of_mid = self.with_depth_of_mid(probe, truth, &mut depth).map_or(outcome.after, |places| places.map(off));
+        let dt_s = truth.t_s - self.key_s;
+        let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
         let displaced = |stage: TemporalStage| {
             let uv = stage.displaced(probe.uv, w, &self.twist, dt_s).unwrap_or(DVec2::NAN);
             off(self.ideal.px_from_point(uv.extend(1.0)))
         };
         outcome.linear_px = displaced(TemporalStage::Linear);
         outcome.rk2_px = displaced(TemporalStage::Rk2);
-        outcome.level_of_detail_px = self.level_of_detail_px(truth_px, (direction, shift));
-        Some(outcome)
+        outcome
+    }
+
+    /// The places looked at with the depth that n look-ups find at mid-exposure; `None` if it is that.
+    fn with_depth_of_mid(&self, probe: &Probe, truth: &Truth, depth: &mut KeyDepth<'_>) -> Option<[DVec2; MAX_LOOK_UPS + 1]> {
+        let mid_s = self.instant_s(probe, 0.5);
+        if truth.t_s == mid_s {
+            return None;
+        }
+        let looked_at = settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), self.ideal, depth);
+        let (direction, shift) = (truth.direction, truth.in_key.1);
+        Some(std::array::from_fn(|n| {
+            let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
+            self.ideal.px_from_point(direction + w.unwrap_or(0.0) * shift)
+        }))
     }
 
     /// Instant at a share of the exposure, 0 to 1.
@@ -145,14 +154,14 @@ impl Trial<'_> {
     }
 
     /// Source at a share of the exposure, 0 to 1, for a surface of the probe's depth.
-    pub fn source_px(&self, probe: &Probe, run: &Outcome, share: f64) -> DVec2 {
+    pub fn source_px(&self, probe: &Probe, truth: &Truth, share: f64) -> DVec2 {
         let (rotation, shift) = self.path.pose(self.instant_s(probe, share)).relative_to(self.key_pose);
-        self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + run.inverse_depth * shift)
+        self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + truth.inverse_depth * shift)
     }
 
     /// How far the middle of stretch `k` of the path over the exposure is from the middle of its chord.
-    pub fn chord_px(&self, probe: &Probe, run: &Outcome, k: u32, segments: u32) -> f64 {
-        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|half| self.source_px(probe, run, (f64::from(k) + half) / f64::from(segments)));
+    pub fn chord_px(&self, probe: &Probe, truth: &Truth, k: u32, segments: u32) -> f64 {
+        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|half| self.source_px(probe, truth, (f64::from(k) + half) / f64::from(segments)));
         let miss_px = middle.distance(0.5 * (begin + end));
         if miss_px.is_finite() { miss_px } else { 0.0 }
     }
@@ -163,45 +172,36 @@ impl Trial<'_> {
     }
 
     /// What the level of detail changes at the true source: depth there, and so parallax.
-    fn level_of_detail_px(&self, truth_px: DVec2, (direction, shift): (DVec3, DVec3)) -> f64 {
-        let Some(terrain) = self.scene.terrain.as_ref().filter(|_| self.lod.max_error_px > 0.0) else { return 0.0 };
-        let ray = self.key_ray(truth_px);
-        let Some(Met { depth_m, terrain: Some(hit), .. }) = meet(self.scene, self.key_pose.position_ned_m, ray) else { return 0.0 };
-        let drawn_m = self.drawn_depth_m(terrain, &hit, self.key_pose.position_ned_m, ray);
+    pub fn level_of_detail_px(&self, truth: &Truth, lod: &LodSelection) -> f64 {
+        let Some(Met { depth_m, terrain: Some(hit), .. }) = truth.seen.filter(|_| lod.max_error_px > 0.0) else { return 0.0 };
+        let drawn_m = self.drawn_depth_m(lod, &hit, self.key_ray(truth.at_px));
         // w of the line's camera, as `reproject` finds it from the key's.
+        let (direction, shift) = (truth.direction, truth.in_key.1);
         let inverse = |depth_m: f64| direction.z / (depth_m - shift.z).max(1e-9);
         let moved = |w: f64| self.ideal.px_from_point(direction + w * shift);
         moved(inverse(drawn_m)).distance(moved(inverse(depth_m)))
     }
 
-    fn drawn_depth_m(&self, terrain: &Terrain, hit: &TerrainHit, origin_ned_m: DVec3, ray_ned: DVec3) -> f64 {
-        match self.drawn(hit.chunk) {
-            Some(draw) => terrain.drawn_t(hit, draw, origin_ned_m, ray_ned),
-            None => hit.t,
+    /// Depth of the terrain as drawn, along a ray of the key camera that meets the full one at `hit`.
+    fn drawn_depth_m(&self, lod: &LodSelection, hit: &TerrainHit, ray_ned: DVec3) -> f64 {
+        let draw = lod.draws.binary_search_by_key(&hit.chunk, |draw| draw.chunk).ok().map(|i| &lod.draws[i]);
+        match (self.surfaces.terrain(), draw) {
+            (Some(terrain), Some(draw)) => terrain.drawn_t(hit, draw, self.key_pose.position_ned_m, ray_ned),
+            _ => hit.t,
         }
     }
 
-    fn drawn(&self, chunk: u32) -> Option<&ChunkDraw> {
-        let draws = &self.lod.draws;
-        draws.binary_search_by_key(&chunk, |draw| draw.chunk).ok().map(|i| &draws[i])
-    }
-
     /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it.
-    pub fn at_silhouette(&self, probe: &Probe, run: &Outcome) -> bool {
-        self.is_hidden(run) || self.near_a_step(probe, run)
-    }
-
-    fn is_hidden(&self, run: &Outcome) -> bool {
-        let seen = meet(self.scene, self.key_pose.position_ned_m, self.key_ray(run.at_px));
-        seen.is_some_and(|seen| run.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
+    pub fn at_silhouette(&self, probe: &Probe, truth: &Truth) -> bool {
+        truth.is_hidden() || self.near_a_step(probe, truth)
     }
 
     /// Inverse depth is linear over a plane: its second difference tells a step from a slope.
-    fn near_a_step(&self, probe: &Probe, run: &Outcome) -> bool {
-        let pose = self.path.pose(run.t_s);
+    fn near_a_step(&self, probe: &Probe, truth: &Truth) -> bool {
+        let pose = self.path.pose(truth.t_s);
         let look = |offset_px: DVec2| {
             let uv = probe.uv + probe.uv_from_px * offset_px;
-            meet(self.scene, pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
+            self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
         };
         let here = look(DVec2::ZERO);
         NEAR_PX.iter().any(|&px| {
@@ -210,6 +210,12 @@ impl Trial<'_> {
                 (before - 2.0 * here + after).abs() > STEP * before.max(here).max(after)
             })
         })
+    }
+}
+
+impl Truth {
+    fn is_hidden(&self) -> bool {
+        self.seen.is_some_and(|seen| self.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
     }
 }
 
@@ -250,35 +256,23 @@ impl KeyDepth<'_> {
         blend_inverse_depths(texels, at - base)
     }
 
+    /// What is drawn at a place of the key frame, between its texels too.
+    fn along(&self, at_px: DVec2) -> f64 {
+        let trial = self.trial;
+        let ray = trial.key_ray(at_px);
+        match trial.surfaces.meet(trial.key_pose.position_ned_m, ray) {
+            None => 0.0,
+            Some(Met { terrain: Some(hit), .. }) => 1.0 / trial.drawn_depth_m(self.lod, &hit, ray),
+            Some(met) => 1.0 / met.depth_m,
+        }
+    }
+
     fn texel(&mut self, texel: [i64; 2]) -> f64 {
         if let Some((_, w)) = self.known.iter().find(|(known, _)| *known == texel) {
             return *w;
         }
-        let trial = self.trial;
-        let origin = trial.key_pose.position_ned_m;
-        let ray = trial.key_ray(DVec2::new(texel[0] as f64, texel[1] as f64));
-        let w = match (meet(trial.scene, origin, ray), &trial.scene.terrain) {
-            (None, _) => 0.0,
-            (Some(Met { terrain: Some(hit), .. }), Some(terrain)) => 1.0 / trial.drawn_depth_m(terrain, &hit, origin, ray),
-            (Some(met), _) => 1.0 / met.depth_m,
-        };
+        let w = self.along(DVec2::new(texel[0] as f64, texel[1] as f64));
         self.known.push((texel, w));
         w
     }
-}
-
-/// First surface along a ray.
-fn meet(scene: &Scene, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
-    let mut first = scene
-        .terrain
-        .as_ref()
-        .and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY))
-        .map(|hit| Met { depth_m: hit.t, terrain: Some(hit) });
-    for mesh in &scene.meshes {
-        let limit = first.map_or(f64::INFINITY, |met| met.depth_m);
-        if let Some((t, _)) = mesh.intersect(origin_ned_m, direction_ned, limit) {
-            first = Some(Met { depth_m: t, terrain: None });
-        }
-    }
-    first
 }

@@ -4,17 +4,18 @@
 //! rays (`dry_run.rs`), and what single precision adds comes from the sizes of the numbers (`rounding.rs`). The largest error of n probes
 //! is above the 99th percentile of all pixels with a probability of `1 - 0.99^n` (98.7 % of 432); what it misses is what [`SAFETY`] is for.
 
-use std::cell::Cell;
+use std::sync::OnceLock;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
     BlurStage, EdgeStage, LensReach, Motion, RayStage, TemporalStage,
-    dry_run::{MAX_LOOK_UPS, Outcome, Trial},
+    dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     levels::Expected,
     probes::Probe,
     rounding::Rounding,
+    surfaces::Surfaces,
 };
 use crate::{
     camera::CameraModel,
@@ -94,6 +95,7 @@ pub(super) struct Case<'a> {
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
+    pub surfaces: &'a Surfaces,
 }
 
 /// What was chosen, and what it leads to.
@@ -114,17 +116,16 @@ pub(super) struct Way {
 pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &Motion, edges: EdgeStage) -> Choice {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
+    let truths = case.truths();
     let mut terrain_error_px = quality.max_terrain_error_px;
-    let lod = case.level_of_detail(terrain_error_px);
-    let mut forecast = case.forecast(&lod);
-    let detail_px = forecast.level_of_detail_px();
-    let finer;
+    let mut lod = case.level_of_detail(terrain_error_px);
+    let detail_px = truths.level_of_detail_px(&lod);
     if SAFETY * detail_px > DETAIL_SHARE * tolerance_px {
         // The error falls in proportion, in steps by which a chunk's level of detail changes.
         terrain_error_px *= 0.8 * DETAIL_SHARE * tolerance_px / (SAFETY * detail_px);
-        finer = case.level_of_detail(terrain_error_px);
-        forecast = case.forecast(&finer);
+        lod = case.level_of_detail(terrain_error_px);
     }
+    let forecast = truths.forecast(&lod);
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match demanded {
@@ -167,70 +168,86 @@ impl Case<'_> {
         })
     }
 
-    fn forecast<'a>(&'a self, lod: &'a LodSelection) -> Forecast<'a> {
+    /// With an exposure that shows, the probes take turns in trying its middle and both its ends.
+    fn truths(&self) -> Truths<'_> {
         let trial = Trial {
-            scene: &self.sequence.scene,
+            surfaces: self.surfaces,
             path: &self.sequence.path,
             shutter: self.shutter,
             stamp_s: self.stamp_s,
             key_s: self.key_s,
             key_pose: self.key_pose,
             ideal: self.ideal,
-            lod,
             twist: self.key_twist,
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
         };
-        Forecast::new(&self.reach.probes, &self.reach.camera, self.ray, trial, self.blur.is_some())
+        let phases: &[f64] = if self.blur.is_some() { &[0.0, -0.5, 0.5] } else { &[0.0] };
+        let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
+        let looked = self.reach.probes.par_iter().enumerate().with_min_len(16).filter_map(look).collect();
+        Truths { camera: &self.reach.camera, ray: self.ray, trial, looked }
+    }
+}
+
+/// Where the probes of one frame look.
+struct Truths<'a> {
+    camera: &'a CameraModel,
+    ray: RayStage,
+    trial: Trial<'a>,
+    looked: Vec<Looked>,
+}
+
+/// One probe.
+struct Looked {
+    probe: Probe,
+    truth: Truth,
+    /// Whether it is to be counted apart; unknown until it matters.
+    apart: OnceLock<bool>,
+}
+
+impl Looked {
+    fn new(probe: Probe, truth: Truth) -> Self {
+        Self { probe, truth, apart: OnceLock::new() }
+    }
+}
+
+impl<'a> Truths<'a> {
+    /// Largest displacement of a source by the level of detail.
+    fn level_of_detail_px(&self, lod: &LodSelection) -> f64 {
+        self.largest(|_, looked| self.trial.level_of_detail_px(&looked.truth, lod))
+    }
+
+    /// The largest of a figure over the probes that are not to be counted apart. Only the largest are asked whether they are.
+    fn largest(&self, of: impl Fn(usize, &Looked) -> f64) -> f64 {
+        let counted = self.looked.iter().enumerate().filter(|(_, looked)| looked.apart.get() != Some(&true));
+        let mut order: Vec<(f64, &Looked)> = counted.map(|(i, looked)| (of(i, looked), looked)).collect();
+        order.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let is_apart = |looked: &Looked| *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth));
+        order.into_iter().find(|(px, looked)| *px == 0.0 || !is_apart(looked)).map_or(0.0, |(px, _)| px)
+    }
+
+    fn forecast(self, lod: &'a LodSelection) -> Forecast<'a> {
+        let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, lod);
+        let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
+        Forecast { outcomes, lod, truths: self }
     }
 }
 
 /// Dry runs of one frame.
-pub(super) struct Forecast<'a> {
-    camera: &'a CameraModel,
-    ray: RayStage,
-    trial: Trial<'a>,
-    runs: Vec<Run>,
+struct Forecast<'a> {
+    truths: Truths<'a>,
+    lod: &'a LodSelection,
+    /// One for each of the probes.
+    outcomes: Vec<Outcome>,
 }
 
-/// One probe.
-struct Run {
-    probe: Probe,
-    outcome: Outcome,
-    /// Whether it is to be counted apart; unknown until it matters.
-    apart: Cell<Option<bool>>,
-}
-
-impl<'a> Forecast<'a> {
-    /// With an exposure that shows, the probes take turns in trying its middle and both its ends.
-    pub fn new(probes: &[Probe], camera: &'a CameraModel, ray: RayStage, trial: Trial<'a>, exposed: bool) -> Self {
-        let phases: &[f64] = if exposed { &[0.0, -0.5, 0.5] } else { &[0.0] };
-        let run = |(i, probe): (usize, &Probe)| {
-            trial.run(probe, phases[i % phases.len()]).map(|outcome| Run { probe: *probe, outcome, apart: Cell::new(None) })
-        };
-        let runs = probes.par_iter().enumerate().with_min_len(16).filter_map(run).collect();
-        Self { camera, ray, trial, runs }
-    }
-
-    /// The largest of a figure over the runs that are not to be counted apart. Only the largest are asked whether they are.
-    fn largest(&self, of: impl Fn(&Run) -> f64) -> f64 {
-        let mut order: Vec<(f64, &Run)> = self.runs.iter().filter(|run| run.apart.get() != Some(true)).map(|run| (of(run), run)).collect();
-        order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let counted = |run: &Run| {
-            let apart = run.apart.get().unwrap_or_else(|| self.trial.at_silhouette(&run.probe, &run.outcome));
-            run.apart.set(Some(apart));
-            !apart
-        };
-        order.into_iter().find(|(px, run)| *px == 0.0 || counted(run)).map_or(0.0, |(px, _)| px)
-    }
-
-    /// Largest displacement of a source by the level of detail.
-    pub fn level_of_detail_px(&self) -> f64 {
-        self.largest(|run| run.outcome.level_of_detail_px)
+impl Forecast<'_> {
+    fn largest(&self, of: impl Fn(&Looked, &Outcome) -> f64) -> f64 {
+        self.truths.largest(|i, looked| of(looked, &self.outcomes[i]))
     }
 
     /// Without the chords of the exposure.
     pub fn total_px(&self, way: Way) -> f64 {
-        self.largest(|run| SAFETY * error_px(&run.outcome, way) + self.rounding(run, way.temporal).total_px())
+        self.largest(|looked, run| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px())
     }
 
     /// The first way within the tolerance, or the best there is.
@@ -262,11 +279,11 @@ impl<'a> Forecast<'a> {
         let nodes_px = self.nodes_px(blur);
         let total_px = self.total_px(way) + nodes_px;
         let Expected { resampling_dn, blur_dn } = case.expected;
-        let lens_px = self.largest(|run| self.rounding(run, stage).lens_px);
-        let format_px = self.largest(|run| self.rounding(run, stage).format_px);
-        let temporal_px = SAFETY * self.largest(|run| unsettled_px(&run.outcome, way));
+        let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
+        let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
+        let temporal_px = SAFETY * self.largest(|_, run| unsettled_px(run, way));
         let depth_px = match stage {
-            TemporalStage::Reproject { .. } => SAFETY * self.largest(|run| run.outcome.after[MAX_LOOK_UPS]),
+            TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
         };
         let kept = total_px <= max_error_px;
@@ -278,13 +295,13 @@ impl<'a> Forecast<'a> {
             (nodes_px, "the straight stretches between the exposure's nodes"),
         ];
         let largest = causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| !kept);
-        let probes = self.runs.len() as u32;
-        let apart = self.runs.iter().filter(|run| run.apart.get() == Some(true)).count();
+        let probes = self.outcomes.len() as u32;
+        let apart = self.truths.looked.iter().filter(|looked| looked.apart.get() == Some(&true)).count();
         Predicted {
             lens_px,
             temporal_px,
             depth_px,
-            level_of_detail_px: self.level_of_detail_px(),
+            level_of_detail_px: self.truths.level_of_detail_px(self.lod),
             nodes_px,
             format_px,
             resampling_dn,
@@ -299,19 +316,21 @@ impl<'a> Forecast<'a> {
         }
     }
 
-    fn rounding(&self, run: &Run, stage: TemporalStage) -> Rounding {
-        Rounding::new(&run.probe, run.outcome.at_px, run.outcome.parallax_px, self.camera, self.trial.ideal, self.ray, stage)
+    fn rounding(&self, Looked { probe, truth, .. }: &Looked, run: &Outcome, stage: TemporalStage) -> Rounding {
+        let Truths { camera, ray, trial, .. } = &self.truths;
+        Rounding::new(probe, truth.at_px, run.parallax_px, camera, trial.ideal, *ray, stage)
     }
 
     /// Largest miss of the straight stretches between the exposure's nodes.
     fn nodes_px(&self, blur: Option<BlurStage>) -> f64 {
         let Some(segments) = blur.map(|blur| blur.nodes - 1) else { return 0.0 };
+        let Truths { trial, looked, .. } = &self.truths;
         let looked_at = CHORD_SEGMENTS.min(segments);
-        let every = self.runs.len().div_ceil(CHORD_PROBES).max(1);
-        let miss = |run: &Run| {
-            (0..looked_at).map(|k| self.trial.chord_px(&run.probe, &run.outcome, k * segments / looked_at, segments)).fold(0.0, f64::max)
+        let every = looked.len().div_ceil(CHORD_PROBES).max(1);
+        let miss = |Looked { probe, truth, .. }: &Looked| {
+            (0..looked_at).map(|k| trial.chord_px(probe, truth, k * segments / looked_at, segments)).fold(0.0, f64::max)
         };
-        SAFETY * self.runs.iter().step_by(every).map(miss).fold(0.0, f64::max)
+        SAFETY * looked.iter().step_by(every).map(miss).fold(0.0, f64::max)
     }
 }
 

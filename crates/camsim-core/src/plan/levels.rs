@@ -14,6 +14,7 @@ use super::{
     BlurStage, LensReach,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
+    surfaces::Surfaces,
     transfer::{Path, SurfaceFilter, error2},
 };
 use crate::{
@@ -101,6 +102,7 @@ impl<'a> Prospect<'a> {
     pub fn new(
         reach: &LensReach,
         sequence: &Sequence,
+        surfaces: &Surfaces,
         grain: &'a SceneGrain,
         shutter: &Shutter,
         stamp_s: f64,
@@ -124,7 +126,7 @@ impl<'a> Prospect<'a> {
                 let in_key = rotation * uv.extend(1.0) + inverse_depth * shift;
                 focal_px * in_key.truncate() / in_key.z
             };
-            let shown = Shown::new(&sequence.scene, &pose, probe.uv, focal_px, key_px)?;
+            let shown = Shown::new((&sequence.scene, surfaces), &pose, probe.uv, focal_px, key_px)?;
             let path = path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
             let clear =
                 sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
@@ -258,7 +260,13 @@ struct Shown {
 
 impl Shown {
     /// By the ray itself and two beside it; `None` for the sky, a texture of one colour, and where the three meet different surfaces.
-    fn new(scene: &Scene, pose: &CameraPose, uv: DVec2, focal_px: DVec2, key_px: impl Fn(DVec2, f64) -> DVec2) -> Option<Self> {
+    fn new(
+        scene: (&Scene, &Surfaces),
+        pose: &CameraPose,
+        uv: DVec2,
+        focal_px: DVec2,
+        key_px: impl Fn(DVec2, f64) -> DVec2,
+    ) -> Option<Self> {
         const BESIDE_PX: f64 = 0.5;
         let look = |offset_px: DVec2| texture_at(scene, pose, uv + offset_px / focal_px);
         let here = look(DVec2::ZERO)?;
@@ -286,22 +294,19 @@ struct Texel {
     texel: DVec2,
 }
 
-fn texture_at(scene: &Scene, pose: &CameraPose, uv: DVec2) -> Option<Texel> {
+fn texture_at((scene, surfaces): (&Scene, &Surfaces), pose: &CameraPose, uv: DVec2) -> Option<Texel> {
     let (origin, direction) = (pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0));
-    let terrain = scene.terrain.as_ref().and_then(|terrain| {
-        let hit = terrain.intersect(origin, direction, f64::INFINITY)?;
-        Some((0, hit.t, hit.uv, &terrain.texture))
-    });
-    let mut first = terrain;
-    for (i, mesh) in scene.meshes.iter().enumerate() {
-        let limit = first.as_ref().map_or(f64::INFINITY, |found| found.1);
-        if let Some((t, uv)) = mesh.intersect(origin, direction, limit) {
-            first = Some((1 + i, t, uv, &mesh.texture));
+    let met = surfaces.meet(origin, direction)?;
+    let (uv, texture) = match (met.terrain, &scene.terrain, met.surface.checked_sub(1)) {
+        (Some(hit), Some(terrain), _) => (hit.uv, &terrain.texture),
+        (_, _, Some(i)) => {
+            let mesh = scene.meshes.get(i)?;
+            (mesh.intersect(origin, direction, met.depth_m * (1.0 + 1e-9))?.1, &mesh.texture)
         }
-    }
-    let (surface, depth_m, uv, texture) = first?;
+        _ => return None,
+    };
     let size = DVec2::new(f64::from(texture.size_px[0]), f64::from(texture.size_px[1]));
-    Some(Texel { surface, depth_m, texel: DVec2::from_array(uv) * size })
+    Some(Texel { surface: met.surface, depth_m: met.depth_m, texel: DVec2::from_array(uv) * size })
 }
 
 /// Path of the source over the exposure, camera px: from end to end, and its length.

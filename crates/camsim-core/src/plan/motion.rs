@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-use super::{LensReach, Motion, Skip, TemporalStage};
-use crate::{mount::CameraPath, scenario::QualitySpec, scene::Scene, shutter::Shutter, temporal::IdealGeometry};
+use super::{LensReach, Motion, Skip, TemporalStage, surfaces::Surfaces};
+use crate::{mount::CameraPath, scenario::QualitySpec, shutter::Shutter, temporal::IdealGeometry};
 
 /// Part of the tolerance that a left-out effect may use up.
 const NEGLIGIBLE: f64 = 0.2;
@@ -27,7 +27,7 @@ pub(super) fn measure(
     stamp_s: f64,
     key_s: f64,
     ideal: &IdealGeometry,
-    scene: &Scene,
+    surfaces: &Surfaces,
 ) -> Motion {
     let key = path.pose(key_s);
     let (first, last) = shutter.window_s();
@@ -35,7 +35,7 @@ pub(super) fn measure(
     let travel_m = super::travel_m(path, window_s, key_s);
     let rotation_rad =
         instants(path, window_s).map(|t| path.pose(t).ned_from_camera.angle_between(key.ned_from_camera)).fold(0.0, f64::max);
-    let nearest_m = super::nearest_m(scene, &key, ideal.tangents(), travel_m);
+    let nearest_m = surfaces.nearest_m(&key, ideal.tangents(), travel_m);
     let slant = reach.slant();
     let focal_px = ideal.focal_px.max_element();
     let (blur_px, blur_sagitta_px) = blur_path(reach, path, shutter, stamp_s, ideal, 1.0 / nearest_m);

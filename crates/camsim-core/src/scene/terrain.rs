@@ -25,9 +25,10 @@ use glam::{DVec3, Vec3};
 
 pub use bounds::Aabb;
 use bounds::BlockTree;
+pub(in crate::scene) use bounds::inverse;
 pub(crate) use query::Frustum;
 pub use query::TerrainHit;
-pub(super) use query::intersect_triangle;
+pub(crate) use query::intersect_triangle;
 pub use select::{ChunkDraw, LodSelection, select_lod};
 pub use stitch::{lod_vertex, snap};
 

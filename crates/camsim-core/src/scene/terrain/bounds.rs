@@ -57,29 +57,31 @@ impl Aabb {
         (normal * self.min).max(normal * self.max).element_sum()
     }
 
-    /// First ray parameter in `0..=t_max` inside the box, for a ray given by its origin and 1 / direction.
+    /// First ray parameter in `0..=t_max` inside the box, for a ray given by its origin and [`inverse`] direction.
     ///
-    /// Both ends are widened by some rounding errors: a box must never hide a hit of a triangle within it.
-    pub(super) fn enter(&self, origin: DVec3, inverse_direction: DVec3, t_max: f64) -> Option<f64> {
+    /// The box is taken a nanometre larger, and both ends are widened by some rounding errors: it must never hide a hit of a triangle
+    /// within it, nor one that a ray within the plane of a face meets.
+    pub(in crate::scene) fn enter(&self, origin: DVec3, inverse_direction: DVec3, t_max: f64) -> Option<f64> {
         const WIDER: f64 = 1e-14;
-        let (mut t_enter, mut t_exit) = (0.0_f64, t_max);
-        for axis in 0..3 {
-            let near = (self.min[axis] - origin[axis]) * inverse_direction[axis];
-            let far = (self.max[axis] - origin[axis]) * inverse_direction[axis];
-            // 0 * infinity: the ray runs within a face's plane, which is inside.
-            if !near.is_nan() && !far.is_nan() {
-                t_enter = t_enter.max(near.min(far) * (1.0 - WIDER));
-                t_exit = t_exit.min(near.max(far) * (1.0 + WIDER));
-            }
-        }
+        const LARGER_M: f64 = 1e-9;
+        let near = (self.min - origin - LARGER_M) * inverse_direction;
+        let far = (self.max - origin + LARGER_M) * inverse_direction;
+        let t_enter = near.min(far).max_element().max(0.0) * (1.0 - WIDER);
+        let t_exit = near.max(far).min_element().min(t_max) * (1.0 + WIDER);
         (t_enter <= t_exit && !self.is_empty()).then_some(t_enter)
     }
 }
 
-/// Cells along each side of the tree's leaves.
-pub(super) const BLOCK_CELLS: u32 = 8;
+/// 1 / direction for [`Aabb::enter`]. A component of 0 counts as one too small to matter: its inverse is finite, and times 0 it is 0.
+pub(in crate::scene) fn inverse(direction: DVec3) -> DVec3 {
+    const NONE: f64 = 1e-290;
+    DVec3::select(direction.abs().cmplt(DVec3::splat(NONE)), DVec3::splat(NONE), direction).recip()
+}
 
-/// An implicit quadtree: level 0 holds one box for each 8x8 cells, each level above one for 2x2 of the level below, the last one box.
+/// Cells along each side of the tree's leaves.
+pub(super) const BLOCK_CELLS: u32 = 4;
+
+/// An implicit quadtree: level 0 holds one box for each 4x4 cells, each level above one for 2x2 of the level below, the last one box.
 #[derive(Clone, Debug)]
 pub(super) struct BlockTree {
     levels: Vec<TreeLevel>,

@@ -1,10 +1,10 @@
 //! Rays and distances against the full surface, in f64.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3, Vec3};
 
 use super::{
     ChunkDraw, Terrain,
-    bounds::{BLOCK_CELLS, Node},
+    bounds::{BLOCK_CELLS, Node, inverse},
     stitch::cell_triangles,
 };
 use crate::pose::CameraPose;
@@ -28,11 +28,11 @@ impl Terrain {
     /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The direction need not have unit
     /// length. Rays cannot slip through between triangles.
     pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
-        let inverse = direction_ned.recip();
+        let inverse = inverse(direction_ned);
         let mut best: Option<TerrainHit> = None;
         let mut limit = t_max;
         let root = self.tree.root();
-        let mut stack: Vec<(f64, Node)> = Vec::with_capacity(32);
+        let mut stack: Vec<(f64, Node)> = Vec::with_capacity(64);
         stack.extend(self.tree.bounds(root).enter(origin_ned_m, inverse, limit).map(|t| (t, root)));
         while let Some((t_enter, node)) = stack.pop() {
             if t_enter > limit {
@@ -47,10 +47,12 @@ impl Terrain {
             }
             let below = stack.len();
             for child in self.tree.children(node) {
-                stack.extend(self.tree.bounds(child).enter(origin_ned_m, inverse, limit).map(|t| (t, child)));
+                if let Some(t) = self.tree.bounds(child).enter(origin_ned_m, inverse, limit) {
+                    // Nearest last, so that it comes off first.
+                    let place = (below..stack.len()).find(|&i| stack[i].0 < t).unwrap_or(stack.len());
+                    stack.insert(place, (t, child));
+                }
             }
-            // Nearest last, so that it comes off first.
-            stack[below..].sort_by(|a, b| b.0.total_cmp(&a.0));
         }
         best
     }
@@ -86,7 +88,7 @@ impl Terrain {
         Some(top + hit.t)
     }
 
-    /// A lower bound of the distance from a point to the surface, from boxes around 8x8 cells; 0 inside such a box.
+    /// A lower bound of the distance from a point to the surface, from boxes around 4x4 cells; 0 inside such a box.
     pub fn min_distance_m(&self, position_ned_m: DVec3) -> f64 {
         self.nearest_box_m(position_ned_m, &|_| true)
     }
@@ -124,27 +126,64 @@ impl Terrain {
         nearest
     }
 
+    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point of a plane, and a cell all of
+    /// whose vertices lie to one side of the ray there is missed.
     fn intersect_block(&self, block: [u32; 2], origin: DVec3, direction: DVec3, t_max: f64) -> Option<TerrainHit> {
         let (chunk_index, [i0, j0]) = self.chunk_of_cell(block.map(|n| n * BLOCK_CELLS));
         let chunk = &self.chunks[chunk_index as usize];
-        let mut best = None;
-        let mut limit = t_max;
-        for b in j0..(j0 + BLOCK_CELLS).min(chunk.cells[1]) {
-            for a in i0..(i0 + BLOCK_CELLS).min(chunk.cells[0]) {
-                for corners in cell_triangles([a, b], chunk.cells, 0, [0; 4]) {
-                    let points = corners.map(|[i, j]| self.position_ned_m(chunk_index, i, j));
-                    let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
-                    limit = t;
-                    let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
-                    let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
-                    let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
-                    let normal_ned = if normal.z > 0.0 { -normal } else { normal };
-                    best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell: [a, b] });
+        let [columns, rows] = [(i0, chunk.cells[0]), (j0, chunk.cells[1])].map(|(first, cells)| BLOCK_CELLS.min(cells - first) as usize);
+        let (right, up) = direction.normalize().any_orthonormal_pair();
+        let centre_m = chunk.centre_ned_m - origin;
+        let mut beside = [[DVec2::NAN; SIDE]; SIDE];
+        for (j, row) in (j0..).zip(beside.iter_mut().take(rows + 1)) {
+            let first = (chunk.first_vertex + j * (chunk.cells[0] + 1) + i0) as usize;
+            for (place, vertex) in row.iter_mut().zip(&self.vertices[first..=first + columns]) {
+                let offset_m = centre_m + Vec3::from(vertex.offset_m).as_dvec3();
+                *place = DVec2::new(offset_m.dot(right), offset_m.dot(up));
+            }
+        }
+        let mut best: Option<TerrainHit> = None;
+        for j in 0..rows {
+            for i in 0..columns {
+                if passes([beside[j][i], beside[j][i + 1], beside[j + 1][i], beside[j + 1][i + 1]]) {
+                    let limit = best.map_or(t_max, |hit| hit.t);
+                    best = self.intersect_cell(chunk_index, [i0 + i as u32, j0 + j as u32], origin, direction, limit).or(best);
                 }
             }
         }
         best
     }
+
+    fn intersect_cell(&self, chunk_index: u32, cell: [u32; 2], origin: DVec3, direction: DVec3, t_max: f64) -> Option<TerrainHit> {
+        let chunk = &self.chunks[chunk_index as usize];
+        let mut best = None;
+        let mut limit = t_max;
+        for corners in cell_triangles(cell, chunk.cells, 0, [0; 4]) {
+            let points = corners.map(|[i, j]| self.position_ned_m(chunk_index, i, j));
+            let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
+            limit = t;
+            let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
+            let uv = [0, 1].map(|k: usize| (0..3).map(|c| weights[c] * f64::from(uvs[c][k])).sum());
+            let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize_or_zero();
+            let normal_ned = if normal.z > 0.0 { -normal } else { normal };
+            best = Some(TerrainHit { t, uv, normal_ned, chunk: chunk_index, cell });
+        }
+        best
+    }
+}
+
+/// Vertices along a side of a block.
+const SIDE: usize = BLOCK_CELLS as usize + 1;
+
+/// Whether a ray may pass a cell whose corners it sees at these places around it. The margin is far above what rounding moves them by;
+/// places that are no numbers count as passed, and are left to the triangles.
+fn passes(corners: [DVec2; 4]) -> bool {
+    const MARGIN: f64 = 0.01;
+    let [a, b, c, d] = corners;
+    let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+    let margin = MARGIN * (high - low).element_sum();
+    let missed = low.max_element() > margin || high.min_element() < -margin;
+    !(missed && (a + b + c + d).is_finite())
 }
 
 /// Ray parameter in 0..=`t_max` and barycentric weights where a ray meets a triangle, from either side. Corners that are not finite are
@@ -153,7 +192,7 @@ impl Terrain {
 /// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates its volume in floating point,
 /// so two triangles agree on which side of their common edge a ray passes. Where several edges meet, rounding could still open a gap:
 /// triangles are larger by the rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
-pub(in crate::scene) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
     /// 18 products and sums at most, of eps / 2 each, and some reserve.
     const ROUNDING: f64 = 4e-15;
     let [a, b, c] = points.map(|p| p - origin);

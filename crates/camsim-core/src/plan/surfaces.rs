@@ -1,0 +1,155 @@
+//! What the plan's rays meet: the terrain at full detail and every mesh.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::NEAR_M;
+use crate::{
+    pose::CameraPose,
+    scene::{Aabb, Mesh, Scene, Terrain, TerrainHit, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
+};
+
+/// The surfaces of a scene, prepared for rays.
+#[derive(Debug)]
+pub(super) struct Surfaces {
+    scene: Arc<Scene>,
+    /// Mesh and place of the first corner in its indices.
+    triangles: Vec<(u32, u32)>,
+    tree: BoxTree,
+}
+
+/// Where a ray first meets something.
+#[derive(Clone, Copy)]
+pub(super) struct Met {
+    /// Ray parameter; planar depth for a direction with z = 1 in its camera, metres.
+    pub depth_m: f64,
+    /// 0 = terrain, 1 + i = mesh i.
+    pub surface: usize,
+    /// The place on the terrain, if it is that.
+    pub terrain: Option<TerrainHit>,
+}
+
+impl Surfaces {
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let of_mesh = |(i, mesh): (usize, &Mesh)| (0..mesh.indices.len() as u32 / 3).map(move |k| (i as u32, 3 * k)).collect::<Vec<_>>();
+        let triangles: Vec<(u32, u32)> = scene.meshes.iter().enumerate().flat_map(of_mesh).collect();
+        let bounds = |&(mesh, first): &(u32, u32)| {
+            let mut bounds = Aabb::EMPTY;
+            corners(&scene.meshes[mesh as usize], first).into_iter().for_each(|corner| bounds.include(corner));
+            bounds
+        };
+        let tree = BoxTree::new(&triangles.iter().map(bounds).collect::<Vec<_>>());
+        Self { scene, triangles, tree }
+    }
+
+    pub fn terrain(&self) -> Option<&Terrain> {
+        self.scene.terrain.as_ref()
+    }
+
+    /// First surface along `origin + t direction`, t >= 0.
+    pub fn meet(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
+        let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
+        let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
+        let triangle = |triangle: u32, limit: f64| {
+            let (mesh, first) = self.triangles[triangle as usize];
+            let points = corners(&self.scene.meshes[mesh as usize], first);
+            intersect_triangle(points, origin_ned_m, direction_ned, limit).map(|(t, _)| (t, 1 + mesh as usize))
+        };
+        let of_mesh = self.tree.first(origin_ned_m, direction_ned, limit, triangle);
+        let on_mesh = of_mesh.map(|(depth_m, surface)| Met { depth_m, surface, terrain: None });
+        on_mesh.or(ground.map(|hit| Met { depth_m: hit.t, surface: 0, terrain: Some(hit) }))
+    }
+
+    /// Lower bound of the planar depth of anything in view from within `travel_m` of `pose`, metres; infinite with nothing in view.
+    /// `tangents` = [u_min, u_max, v_min, v_max].
+    pub fn nearest_m(&self, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> f64 {
+        let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
+        let terrain = self.terrain().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
+        let frustum = Frustum::new(pose, tangents);
+        let meshes = self.tree.nearest_box_m(pose.position_ned_m, |bounds| frustum.may_see(bounds));
+        // Slant range to planar depth by the widest ray; the camera may come closer within the window.
+        ((terrain.min(meshes) - travel_m) / (1.0 + r2).sqrt()).max(2.0 * NEAR_M)
+    }
+}
+
+/// NED, metres.
+fn corners(mesh: &Mesh, first: u32) -> [DVec3; 3] {
+    [0, 1, 2].map(|k| mesh.position_ned_m(mesh.indices[first as usize + k]))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use glam::{DQuat, EulerRot};
+
+    use super::*;
+    use crate::scene::{Encoding, Texture};
+
+    /// Waves of 30 m under three pictures at different heights, one of them tilted.
+    fn scene() -> Scene {
+        let heights: Vec<f64> = (0..97 * 97).map(|i| 30.0 * (f64::from(i % 97) * 0.3).sin() * (f64::from(i / 97) * 0.2).cos()).collect();
+        let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+        let picture = |north_m: f64, height_m: f64| Mesh::level_picture(texture.clone(), DVec3::new(north_m, 10.0, -height_m), 60.0);
+        let mut meshes = vec![picture(-100.0, 40.0), picture(0.0, 60.0), picture(100.0, 5.0)];
+        meshes[1].vertices[0].position_m[2] = 25.0;
+        Scene { terrain: Some(Terrain::from_heights(97, 97, 10.0, &heights, None).unwrap()), meshes, ..Scene::default() }
+    }
+
+    #[test]
+    fn rays_meet_what_a_look_at_every_triangle_finds() {
+        let scene = scene();
+        let terrain = scene.terrain.as_ref().unwrap();
+        let of_terrain: Vec<[DVec3; 3]> = (0..terrain.chunks.len() as u32)
+            .flat_map(|chunk| {
+                let [columns, rows] = terrain.chunks[chunk as usize].cells;
+                (0..rows).flat_map(move |j| (0..columns).map(move |i| (chunk, i, j)))
+            })
+            .flat_map(|(chunk, i, j)| {
+                let at = |a: u32, b: u32| terrain.position_ned_m(chunk, i + a, j + b);
+                [[at(0, 0), at(1, 1), at(1, 0)], [at(0, 0), at(0, 1), at(1, 1)]]
+            })
+            .collect();
+        let surfaces = Surfaces::new(Arc::new(scene.clone()));
+        let (mut seen, mut missed) = ([0; 2], 0);
+        for k in 0..150 {
+            let angle = 0.37 * f64::from(k);
+            let origin = DVec3::new(3.0 * f64::from(k % 71) - 100.0, 40.0 * angle.sin(), -80.0);
+            // From straight down to above the horizon.
+            let direction = DVec3::new(angle.cos(), angle.sin(), 1.6 * (0.11 * f64::from(k)).cos().abs() - 0.05);
+            let ground =
+                of_terrain.iter().filter_map(|&points| intersect_triangle(points, origin, direction, f64::INFINITY)).map(|hit| hit.0);
+            let ground = ground.fold(f64::INFINITY, f64::min);
+            let meshes = scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, direction, f64::INFINITY)).map(|hit| hit.0);
+            let meshes = meshes.fold(f64::INFINITY, f64::min);
+            let found = surfaces.meet(origin, direction);
+            assert_eq!(found.map_or(f64::INFINITY, |met| met.depth_m), ground.min(meshes), "ray {k}");
+            match found {
+                Some(met) => {
+                    assert_eq!(met.surface > 0, meshes < ground);
+                    seen[usize::from(met.surface > 0)] += 1;
+                }
+                None => missed += 1,
+            }
+        }
+        assert!(seen[0] > 50 && seen[1] > 10 && missed > 2, "{seen:?} {missed}");
+    }
+
+    #[test]
+    fn meshes_behind_the_camera_are_not_near() {
+        let mut scene = scene();
+        scene.terrain = None;
+        let surfaces = Surfaces::new(Arc::new(scene));
+        let pose = |pitch_deg: f64| CameraPose {
+            position_ned_m: DVec3::new(0.0, 10.0, -160.0),
+            ned_from_camera: DQuat::from_euler(EulerRot::ZYX, 0.0, f64::to_radians(pitch_deg), 0.0)
+                * DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X)),
+        };
+        let view = [-0.5, 0.5, -0.5, 0.5];
+        // The middle picture is 100 m below, the corner of another 25 m nearer than its centre would be, at a slant of at most sqrt(1.5).
+        let down = surfaces.nearest_m(&pose(-90.0), view, 1.0);
+        assert!(down <= 99.0 && down >= 99.0 / 1.5_f64.sqrt() - 1e-9, "{down}");
+        assert_eq!(surfaces.nearest_m(&pose(60.0), view, 1.0), f64::INFINITY);
+    }
+}

@@ -1,0 +1,149 @@
+//! A tree of boxes over many small things.
+
+use glam::DVec3;
+
+use super::{Aabb, terrain::inverse};
+
+/// Things of a leaf, at most.
+const LEAF: usize = 4;
+
+/// Boxes within boxes: what a ray meets, or a point is near to, is found without a look at everything.
+#[derive(Debug, Default)]
+pub(crate) struct BoxTree {
+    nodes: Vec<Node>,
+    /// The things, ordered so that those of a leaf follow each other.
+    things: Vec<u32>,
+}
+
+#[derive(Debug)]
+struct Node {
+    bounds: Aabb,
+    /// Of a leaf the place of its first thing, else its second child; the first child follows its parent.
+    next: u32,
+    /// Things of a leaf, else 0.
+    count: u32,
+}
+
+impl BoxTree {
+    /// Over things that are known by their place in `boxes`. Empty boxes are left out.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        let mut tree = Self { nodes: Vec::new(), things: (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect() };
+        let mut things = std::mem::take(&mut tree.things);
+        if !things.is_empty() {
+            tree.build(boxes, &mut things, 0);
+        }
+        tree.things = things;
+        tree
+    }
+
+    /// Halves at the middle thing along the longest side of the box around their centres.
+    fn build(&mut self, boxes: &[Aabb], things: &mut [u32], first: u32) {
+        let centre = |thing: u32| boxes[thing as usize].centre();
+        let bounds = things.iter().fold(Aabb::EMPTY, |all, &thing| all.union(&boxes[thing as usize]));
+        let here = self.nodes.len();
+        self.nodes.push(Node { bounds, next: first, count: things.len() as u32 });
+        if things.len() <= LEAF {
+            return;
+        }
+        let mut centres = Aabb::EMPTY;
+        things.iter().for_each(|&thing| centres.include(centre(thing)));
+        let sides = centres.max - centres.min;
+        let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
+        let middle = things.len() / 2;
+        things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+        let (left, right) = things.split_at_mut(middle);
+        self.build(boxes, left, first);
+        self.nodes[here].count = 0;
+        self.nodes[here].next = self.nodes.len() as u32;
+        self.build(boxes, right, first + middle as u32);
+    }
+
+    /// The first meeting of a ray: `meet(thing, limit)` gives the ray parameter and what is found there, for a thing that is met before
+    /// `limit`.
+    pub fn first<T>(&self, origin: DVec3, direction: DVec3, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
+        let inverse = inverse(direction);
+        let mut best: Option<(f64, T)> = None;
+        let mut stack = Vec::with_capacity(32);
+        let enter = |node: usize, limit: f64| self.nodes[node].bounds.enter(origin, inverse, limit).map(|t| (t, node));
+        stack.extend(self.nodes.first().and_then(|_| enter(0, t_max)));
+        while let Some((t_enter, at)) = stack.pop() {
+            let limit = best.as_ref().map_or(t_max, |(t, _)| *t);
+            if t_enter > limit {
+                continue;
+            }
+            let node = &self.nodes[at];
+            if node.count > 0 {
+                for &thing in &self.things[node.next as usize..(node.next + node.count) as usize] {
+                    let limit = best.as_ref().map_or(t_max, |(t, _)| *t);
+                    best = meet(thing, limit).or(best);
+                }
+                continue;
+            }
+            let children = [enter(at + 1, limit), enter(node.next as usize, limit)];
+            let swap = matches!(children, [Some(a), Some(b)] if a.0 < b.0);
+            // The nearer one last, so that it comes off first.
+            stack.extend(if swap { [children[1], children[0]] } else { children }.into_iter().flatten());
+        }
+        best
+    }
+
+    /// Distance from a point to the nearest leaf's box among those that `accept` takes; infinite without one. Boxes that hold others must be
+    /// accepted if one of those is.
+    pub fn nearest_box_m(&self, point: DVec3, accept: impl Fn(&Aabb) -> bool) -> f64 {
+        let mut nearest = f64::INFINITY;
+        let mut stack: Vec<usize> = self.nodes.first().map(|_| 0).into_iter().collect();
+        while let Some(at) = stack.pop() {
+            let node = &self.nodes[at];
+            let distance = node.bounds.distance_m(point);
+            // Written so that a NaN distance goes nowhere.
+            if distance < nearest && accept(&node.bounds) {
+                if node.count > 0 {
+                    nearest = distance;
+                } else {
+                    stack.extend([node.next as usize, at + 1]);
+                }
+            }
+        }
+        nearest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes of up to 2 m, thrown over 40 m by a fixed rule.
+    fn boxes(count: u32) -> Vec<Aabb> {
+        let part = |k: u32, step: f64| (f64::from(k) * step).fract();
+        (0..count)
+            .map(|k| {
+                let min = 40.0 * DVec3::new(part(k, 0.618_034), part(k, 0.754_878), part(k, 0.569_840));
+                Aabb { min, max: min + 2.0 * DVec3::new(part(k, 0.31), part(k, 0.47), part(k, 0.83)) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_tree_finds_what_a_look_at_everything_finds() {
+        for count in [0, 1, 4, 5, 300] {
+            let boxes = boxes(count);
+            let tree = BoxTree::new(&boxes);
+            let mut met = 0;
+            for k in 0..200 {
+                let angle = 0.1 * f64::from(k);
+                let origin = DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.2 * f64::from(k));
+                let direction = DVec3::new(-angle.cos(), -angle.sin(), 0.3 * (0.7 * f64::from(k)).sin());
+                let enter = |i: u32, limit: f64| boxes[i as usize].enter(origin, inverse(direction), limit).map(|t| (t, i));
+                let all = (0..count).filter_map(|i| enter(i, f64::INFINITY)).min_by(|a, b| a.0.total_cmp(&b.0));
+                let found = tree.first(origin, direction, f64::INFINITY, enter);
+                assert_eq!(found.map(|hit| hit.0), all.map(|hit| hit.0), "{count} boxes, ray {k}");
+                met += u32::from(found.is_some());
+                // A leaf's box holds up to four: not farther than the nearest, and nothing nearer than the leaf.
+                let nearest = boxes.iter().map(|of| of.distance_m(origin)).fold(f64::INFINITY, f64::min);
+                assert!(tree.nearest_box_m(origin, |_| true) <= nearest);
+                assert_eq!(tree.nearest_box_m(origin, |_| false), f64::INFINITY);
+            }
+            assert!(count < 300 || met > 50, "{met}");
+        }
+    }
+}
