@@ -355,10 +355,10 @@ impl Planner {
             key_twist,
             ray,
             blur,
-            surfaces: &self.surfaces,
             straight_blur: blur.map(|_| sampling.blur_stage(2, quality, motion.blur_px)),
             expected,
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
+            surfaces: &self.surfaces,
         };
         let error::Choice { way, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
         let error::Way { temporal, blur } = way;

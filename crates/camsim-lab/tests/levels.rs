@@ -2,16 +2,16 @@
 //!
 //! `CAMSIM_LONG=1` tries all cases of the bench at their own size, with several tolerances; without it two small ones.
 
-use std::sync::Arc;
+use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     plan::{FramePlan, Planner},
     scenario::{Auto, Channel, QualitySpec},
     sequence::Sequence,
 };
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
 use camsim_lab::{
-    bench::{knobs::resize, truth::Truth},
+    bench::{knobs::resize, rounds::FRAME, truth::Truth},
     cases::cases,
 };
 
@@ -29,8 +29,15 @@ fn find(engine: &Engine, truth: &Truth, sequence: &Sequence, quality: QualitySpe
     let mut sequence = sequence.clone();
     sequence.scenario.quality = quality;
     let sequence = Arc::new(sequence);
-    let plan = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner").plan(1).expect("a plan");
-    let measured_dn = truth.errors(engine, &sequence).expect("rendered").smooth_dn.expect("pixels away from silhouettes");
+    let plan = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner").plan(FRAME).expect("a plan");
+    let mut session = engine.session::<Infallible>(sequence, &[Channel::Color]).expect("a session");
+    let mut measured_dn = None;
+    let measure = &mut |done: Finished| {
+        measured_dn = truth.picture_errors(&done.frame).smooth_dn;
+        Ok(())
+    };
+    session.render::<Infallible>([FRAME], measure).expect("rendered");
+    let measured_dn = measured_dn.expect("pixels away from silhouettes");
     Found { plan, measured_dn }
 }
 

@@ -43,9 +43,8 @@ pub(super) struct Trial<'a> {
 /// Where a probe truly looks.
 #[derive(Clone, Copy)]
 pub(super) struct Truth {
-    /// Instant, path time, and where in the exposure it is: -0.5 to 0.5.
+    /// Instant, path time.
     pub t_s: f64,
-    phase: f64,
     /// Source.
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
@@ -101,7 +100,6 @@ impl Trial<'_> {
         }
         Some(Truth {
             t_s,
-            phase,
             at_px,
             inverse_depth,
             key_inverse_depth: inverse_depth / point.z,
@@ -123,21 +121,7 @@ impl Trial<'_> {
         outcome.after = places.map(off);
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
-        outcome.of_mid = if truth.phase == 0.0 {
-            outcome.after
-        } else {
-            let shift = truth.in_key.1;
-            let mid = self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose);
-            let looked_at = settle(probe.uv, mid, self.ideal, &mut depth);
-            std::array::from_fn(|n| match n.checked_sub(1) {
-                None => outcome.parallax_px,
-                Some(last) => {
-                    let found = depth.inverse_depth(looked_at[last]);
-                    let w = depth_on_line(truth.direction, shift, found).unwrap_or(0.0);
-                    off(self.ideal.px_from_point(truth.direction + w * shift))
-                }
-            })
-        };
+        outcome.of_mid = self.with_depth_of_mid(probe, truth, &mut depth).map_or(outcome.after, |places| places.map(off));
         let dt_s = truth.t_s - self.key_s;
         let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
         let displaced = |stage: TemporalStage| {
@@ -147,6 +131,20 @@ impl Trial<'_> {
         outcome.linear_px = displaced(TemporalStage::Linear);
         outcome.rk2_px = displaced(TemporalStage::Rk2);
         outcome
+    }
+
+    /// The places looked at with the depth that n look-ups find at mid-exposure; `None` if it is that.
+    fn with_depth_of_mid(&self, probe: &Probe, truth: &Truth, depth: &mut KeyDepth<'_>) -> Option<[DVec2; MAX_LOOK_UPS + 1]> {
+        let mid_s = self.instant_s(probe, 0.5);
+        if truth.t_s == mid_s {
+            return None;
+        }
+        let looked_at = settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), self.ideal, depth);
+        let (direction, shift) = (truth.direction, truth.in_key.1);
+        Some(std::array::from_fn(|n| {
+            let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
+            self.ideal.px_from_point(direction + w.unwrap_or(0.0) * shift)
+        }))
     }
 
     /// Instant at a share of the exposure, 0 to 1.

@@ -91,11 +91,11 @@ pub(super) struct Case<'a> {
     pub key_twist: Twist,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
-    pub surfaces: &'a Surfaces,
     /// The same for a path that is a straight line whatever its nodes.
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
+    pub surfaces: &'a Surfaces,
 }
 
 /// What was chosen, and what it leads to.
