@@ -101,7 +101,10 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             let uv = DVec2::new(f64::from(coords[i][0]), f64::from(coords[i][1]));
             let entry = |node: u32| pose_from(table.entries[(y * table.stride + node) as usize]);
             let solve = |node| reproject(uv, entry(node), iterations, &depth, &ideal.geometry);
-            let Some(Source { at_px, inverse_depth }) = solve(blur.nodes) else { continue };
+            let Some(Source { at_px, .. }) = solve(blur.nodes) else { continue };
+            // The depth channel is looked up at the source itself.
+            let at_source = reproject_with(uv, entry(blur.nodes), depth.inverse_depth(at_px), &ideal.geometry);
+            let Some(Source { inverse_depth, .. }) = at_source else { continue };
             // Skyline and pattern border: a rounding may pick another texel there.
             if inverse_depth < 1e-4 || depth.inverse_depth(at_px + 3.0) < 1e-4 || depth.inverse_depth(at_px - 3.0) < 1e-4 {
                 continue;

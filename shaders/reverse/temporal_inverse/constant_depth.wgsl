@@ -36,8 +36,15 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     return Source(at_px, found, inside_ideal(at_px));
 }
 
+// A pixel keeps the depth of its own place only to find where it looks. The depth that it reports is what the ideal frame has there, less what the
+// camera's twist takes from it until the line's instant.
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
-    return temporal_inverse(uv, pose);
+    var source = temporal_inverse(uv, pose);
+    let in_key = inverse_depth(source.at_px);
+    let seen = (source.at_px - frame.ideal_principal_px) / frame.ideal_focal_px;
+    let z_rate = -in_key * frame.key_velocity_m_s.z - cross(frame.key_rate_rad_s.xyz, vec3<f32>(seen, 1.0)).z;
+    source.inverse_depth = in_key / max(1.0 + pose.dt_s * z_rate, 1e-3);
+    return source;
 }
 
 const HAS_PARALLAX: bool = true;

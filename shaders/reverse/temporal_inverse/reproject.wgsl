@@ -49,8 +49,11 @@ fn source_of_depth(uv: vec2<f32>, pose: Pose, found: f32) -> Source {
     return source_at(direction, shift, depth_on_line(direction, shift, found, 0.0));
 }
 
+// The depth is looked up once more, where the ray at last looks: what led there was found one look-up earlier.
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
-    return temporal_inverse(uv, pose);
+    var source = temporal_inverse(uv, pose);
+    source.inverse_depth = line_inverse_depth(uv, pose, inverse_depth(source.at_px));
+    return source;
 }
 
 const HAS_PARALLAX: bool = true;

@@ -10,7 +10,8 @@ fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
     var source = temporal_inverse(uv, pose);
-    source.inverse_depth = inverse_depth(source.at_px) * rotate(pose, vec3<f32>(uv, 1.0)).z;
+    let in_key = inverse_depth(source.at_px);
+    source.inverse_depth = in_key * rotate(pose, vec3<f32>(uv, 1.0)).z / max(1.0 - translation(pose).z * in_key, 1e-3);
     return source;
 }
 
