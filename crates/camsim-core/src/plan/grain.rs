@@ -61,6 +61,12 @@ impl SceneGrain {
 }
 
 impl Spectrum {
+    /// The same at all frequencies.
+    #[cfg(test)]
+    pub fn flat(log_density: f64) -> Self {
+        Self { log_density: vec![log_density; 2] }
+    }
+
     fn of(texture: &Texture) -> Self {
         let mut lost = losses_of_pieces(texture);
         // Details wider than a piece, from the whole: of a large texture its blocks are seen through a few of their texels.

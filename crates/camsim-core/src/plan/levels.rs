@@ -30,7 +30,7 @@ use crate::{
 /// Probes that are looked at, at most.
 const SIGHTS: usize = 32;
 /// Times what is expected: textures are not equally grainy everywhere.
-const SAFETY: f64 = 1.15;
+const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
@@ -89,8 +89,8 @@ struct Sight<'a> {
 /// The places of a frame.
 pub(super) struct Prospect<'a> {
     sights: Vec<Sight<'a>>,
-    /// Places looked at: those without a texture count, as without error.
-    looked_at: usize,
+    /// Places that count: those, and the sky.
+    counted: usize,
     /// Of the camera, and but for whole pixels of every ideal frame.
     principal_px: DVec2,
     /// Widest output pixel, camera px.
@@ -108,14 +108,21 @@ impl<'a> Prospect<'a> {
         key_pose: &CameraPose,
     ) -> Self {
         let (probes, focal_px) = (&reach.probes, reach.camera.focal_px);
-        let every = probes.len().div_ceil(SIGHTS).max(1);
         let photometric = &sequence.scenario.camera.photometric;
         let weight = |[x, y]: [u32; 2]| {
             let Some(map) = &sequence.vignette else { return 1.0 };
             let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / reach.camera.size_px[k]) as usize);
             f64::from(vignette_weight(map.values[row * map.size_px[0] as usize + column], photometric.vignette_thresholds))
         };
-        let looked_at: Vec<&Probe> = probes.iter().skip(every / 2).step_by(every).collect();
+        // Evenly over how wide pixels are: the few that are much wider than the rest may be most of the error.
+        let width = |probe: &Probe| {
+            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
+            sides.x_axis.length().max(sides.y_axis.length())
+        };
+        let mut by_width: Vec<&Probe> = probes.iter().collect();
+        by_width.sort_by_key(|probe| (1e4 * width(probe)) as i64);
+        let count = SIGHTS.min(by_width.len());
+        let looked_at: Vec<&Probe> = (0..count).map(|k| by_width[(2 * k + 1) * by_width.len() / (2 * count)]).collect();
         let sight = |probe: &&Probe| {
             let [x, y] = probe.pixel;
             let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
@@ -140,13 +147,15 @@ impl<'a> Prospect<'a> {
                 path_px: path.1,
             })
         };
-        let sights = looked_at.par_iter().filter_map(sight).collect();
-        let widest = probes.iter().map(|probe| {
-            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
-            sides.x_axis.length().max(sides.y_axis.length())
-        });
-        let widest = widest.fold(0.0, f64::max);
-        Self { sights, looked_at: looked_at.len(), principal_px: reach.camera.principal_point_px, widest }
+        let sights: Vec<Sight<'_>> = looked_at.par_iter().filter_map(sight).collect();
+        let is_sky = |probe: &&&Probe| {
+            let [x, y] = probe.pixel;
+            let pose = sequence.path.pose(stamp_s + shutter.dt_pixel_s(x, y));
+            surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0)).is_none()
+        };
+        let counted = sights.len() + looked_at.iter().filter(is_sky).count();
+        let widest = by_width.last().map_or(0.0, |probe| width(probe));
+        Self { sights, counted, principal_px: reach.camera.principal_point_px, widest }
     }
 
     /// What is to be expected of a way of sampling.
@@ -172,7 +181,7 @@ impl<'a> Prospect<'a> {
             error.map(|square| sight.gain * sight.gain * square)
         };
         let sums = self.sights.par_iter().map(of).reduce(|| [0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        sums.map(|sum| sum / self.looked_at.max(1) as f64)
+        sums.map(|sum| sum / self.counted.max(1) as f64)
     }
 
     /// The cheapest sampling within the tolerance, or the best there is. The scale is not below `least_scale`, and that at which the

@@ -188,3 +188,72 @@ pub(super) fn error2(
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::temporal::{ColorImage, TapStage};
+
+    /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.
+    fn measured(f: DVec2, softness: Option<f64>, at: DVec2, exact: f64) -> f64 {
+        let turns = 12;
+        let size_px = [24, 24];
+        let area = Footprint { dx: DVec2::ZERO, dy: DVec2::ZERO, taps: [1, 1], spline: softness.map(DVec2::splat) };
+        let wave = |px: DVec2, phase: f64| (2.0 * PI * f.dot(px) + phase).cos();
+        let squares = (0..turns).map(|turn| {
+            let phase = 2.0 * PI * f64::from(turn) / f64::from(turns);
+            let value = |i: u32| wave(DVec2::new(f64::from(i % 24), f64::from(i / 24)), phase) as f32;
+            let rgba: Vec<f32> = (0..24 * 24).flat_map(|i| [value(i), 0.0, 0.0, 1.0]).collect();
+            let px = DVec2::new(11.0, 12.0) + at;
+            (area.tap_color(&ColorImage { size_px, rgba: &rgba }, px, 0).x - exact * wave(px, phase)).powi(2)
+        });
+        squares.sum::<f64>() / f64::from(turns)
+    }
+
+    #[test]
+    fn reads_between_pixels_leave_and_alias_what_their_transforms_say() {
+        for softness in [None, Some(0.0), Some(0.4)] {
+            for f in [DVec2::new(0.11, 0.05), DVec2::new(0.3, -0.2), DVec2::new(0.45, 0.4)] {
+                for at in [DVec2::ZERO, DVec2::new(0.5, 0.5), DVec2::new(0.2, 0.7)] {
+                    let exact = 0.8;
+                    let left: DVec2 = (-40..=40)
+                        .flat_map(|x| (-40..=40).map(move |y| DVec2::new(f64::from(x), f64::from(y))))
+                        .map(|away| {
+                            read(softness, (f + away).x) * read(softness, (f + away).y) * DVec2::from_angle(2.0 * PI * away.dot(at))
+                        })
+                        .sum();
+                    // The mean square of a real wave is half of its squared amplitude.
+                    let expected = 0.5 * (left - DVec2::new(exact, 0.0)).length_squared();
+                    let found = measured(f, softness, at, exact);
+                    // Further aliases, and the four corners that the spline leaves out.
+                    assert!((found.sqrt() - expected.sqrt()).abs() < 0.01, "{softness:?} {f} {at}: {found:.5} {expected:.5}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_surface_filter_has_the_variance_of_the_pixel() {
+        // 1 - 2 pi^2 f^2 variance for low frequencies; a pixel has 1/12.
+        for texels in [0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.5, 8.0] {
+            let filter = SurfaceFilter::new(DMat2::from_diagonal(DVec2::splat(texels)));
+            let f = 0.02;
+            let variance = (1.0 - filter.leaves(DVec2::new(f / texels, 0.0))) / (2.0 * PI * PI * f * f);
+            assert!((12.0 * variance - 1.0).abs() < 0.03, "{texels}: {}", 12.0 * variance);
+        }
+    }
+
+    #[test]
+    fn an_aligned_pixel_reads_nothing_between_pixels_and_one_beside_does() {
+        let spectrum = Spectrum::flat(-2.0);
+        let filter = SurfaceFilter::new(DMat2::IDENTITY);
+        let error = |stage, beside_px| {
+            let area = Footprint::new(DVec2::X, DVec2::Y, stage);
+            error2(&spectrum, &filter, DMat2::IDENTITY, &area, None, beside_px)[0]
+        };
+        let half = DVec2::splat(0.5);
+        assert!(error(TapStage::Bilinear, half) > 2.0 * error(TapStage::Bilinear, DVec2::ZERO));
+        assert!(error(TapStage::Bilinear, half) > 1.5 * error(TapStage::Spline, half));
+        assert!(error(TapStage::Spline, half) > 2.0 * error(TapStage::Spline, DVec2::ZERO));
+    }
+}
