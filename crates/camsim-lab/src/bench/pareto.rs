@@ -13,6 +13,8 @@ const WORSE: f64 = 1.1;
 const FLOOR_PX: f64 = 2e-4;
 /// Pictures differ from this on, dB.
 const WORSE_DB: f64 = 0.1;
+/// Beyond this the oracle's own noise shows, dB: better pictures are alike.
+const ORACLE_DB: f64 = 55.0;
 
 /// A row that the plan chose, and one that is faster and better.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -79,7 +81,7 @@ fn coords_than(other: &Row, row: &Row, figure: fn(&Row) -> Option<f64>) -> Than 
 
 /// The same of the pictures.
 fn picture_than(other: &Row, row: &Row) -> Than {
-    match (other.psnr_db, row.psnr_db) {
+    match (other.psnr_db.map(|db| db.min(ORACLE_DB)), row.psnr_db.map(|db| db.min(ORACLE_DB))) {
         (Some(other), Some(row)) if other > row + WORSE_DB => Than::Better,
         (Some(other), Some(row)) if other < row - WORSE_DB => Than::Worse,
         _ => Than::Alike,
@@ -152,6 +154,12 @@ mod tests {
         assert_eq!(names(&[auto.clone(), sharper.clone()]), ["sharper"]);
         let smoother = Row { smooth_p99_px: Some(1e-4), ..row("smoother", Family::Solver, [10.0, 11.0, 10.0], 0.05, 45.0) };
         assert_eq!(names(&[Row { smooth_p99_px: Some(2e-3), ..auto.clone() }, smoother]), ["smoother"]);
+        // From 55 dB on pictures are alike.
+        let pictures = |own_db: f64, better_db: f64| {
+            names(&[Row { coord_rms_px: None, psnr_db: Some(own_db), ..auto.clone() }, Row { psnr_db: Some(better_db), ..sharper.clone() }])
+        };
+        assert_eq!(pictures(53.0, 62.0), ["sharper"]);
+        assert!(pictures(59.0, 62.0).is_empty());
         let also = Row { knob: "also auto".into(), same_as: Some("auto".into()), ..auto.clone() };
         assert_eq!(names(&[auto, also, sharper]), ["sharper"]);
     }
