@@ -3,12 +3,16 @@
 
 use super::{
     EdgeStage, Motion, Skip, TemporalStage,
-    edges::{SceneOutline, scale_of},
+    edges::{FINE_PIXEL_BYTES, SceneOutline, scale_of},
 };
 use crate::{mount::CameraPath, pose::CameraPose, scenario::QualitySpec, temporal::IdealGeometry};
 
 /// Most ideal frames of one output frame.
 pub const MAX_KEYS: u32 = 4;
+/// Colour and depth of an ideal pixel.
+const PIXEL_BYTES: u64 = 12;
+/// Memory that more than one ideal frame may take.
+const MAX_BYTES: u64 = 2 << 30;
 /// Allocated heights are multiples of this.
 pub const SIZE_QUANTUM_PX: u32 = 64;
 /// Strips of unseen surface beside silhouettes, ideal pixels, up to which the surface beside them may stand in.
@@ -60,8 +64,11 @@ pub(super) fn wanted(
         skipped.push(Skip { what: "second ideal frame", reason });
         1
     };
-    if !matches!(temporal, TemporalStage::Reproject { .. }) {
-        return one("there is no parallax within the frame".into());
+    match temporal {
+        TemporalStage::Reproject { .. } => {}
+        TemporalStage::Identity => return one("nothing moves within the frame, or by too little to matter".into()),
+        TemporalStage::Rotation => return one("there is no parallax within the frame, or too little to matter".into()),
+        TemporalStage::Linear | TemporalStage::Rk2 => return one("solvers of a constant twist look into a single one".into()),
     }
     if let Some(count) = quality.key_frames.value() {
         return if count <= 1 { one("quality.key_frames is 1".into()) } else { count.min(MAX_KEYS) };
@@ -91,15 +98,16 @@ pub(super) fn fitting(
     for count in (2..=wanted).rev() {
         let (keys, ideal) = made(count);
         let [width, height] = ideal.size_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
-        if width.max(height * u64::from(count)) * scale <= u64::from(max_side_px) {
+        let fine_bytes = if edges == EdgeStage::None { 0 } else { scale * scale * FINE_PIXEL_BYTES };
+        let bytes = width * height * u64::from(count) * (PIXEL_BYTES + fine_bytes);
+        let reason = if width.max(height * u64::from(count)) * scale > u64::from(max_side_px) {
+            format!("{count} of {width}x{height} px are more than the {max_side_px} px a side that the adapter has; reduce camera.size_px")
+        } else if bytes > MAX_BYTES {
+            format!("{count} of {width}x{height} px take {} MiB, more than {}; reduce the field of view", bytes >> 20, MAX_BYTES >> 20)
+        } else {
             return Some((keys, ideal));
-        }
-        skipped.push(Skip {
-            what: "a further ideal frame",
-            reason: format!(
-                "{count} of {width}x{height} px are more than the {max_side_px} px a side that the adapter has; reduce camera.size_px"
-            ),
-        });
+        };
+        skipped.push(Skip { what: "a further ideal frame", reason });
     }
     None
 }
@@ -141,5 +149,10 @@ mod tests {
         assert_eq!(count(4, 2047), (1, 3));
         assert_eq!(count(2, 1300), (1, 1));
         assert_eq!(count(1, 64), (1, 0));
+        // A gigapixel fits into no memory, whatever the adapter's textures hold.
+        let wide =
+            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [10_697, 6787], ..ideal });
+        let mut skipped = Vec::new();
+        assert!(fitting(2, edges, 65_536, &mut skipped, wide).is_none() && skipped[0].reason.contains("MiB"), "{skipped:?}");
     }
 }

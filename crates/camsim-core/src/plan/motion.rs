@@ -3,10 +3,18 @@
 use glam::DVec2;
 
 use super::{LensReach, Motion, Skip, TemporalStage, surfaces::Surfaces};
-use crate::{mount::CameraPath, scenario::QualitySpec, shutter::Shutter, temporal::IdealGeometry};
+use crate::{
+    mount::CameraPath,
+    scenario::{Auto, QualitySpec},
+    shutter::Shutter,
+    temporal::IdealGeometry,
+};
 
 /// Part of the tolerance that a left-out effect may use up.
 const NEGLIGIBLE: f64 = 0.2;
+/// A path shorter than this is no blur, ideal pixels: it takes 0.4 % from the finest wave that the frame holds (1 - sinc(pi / 20)). How much
+/// the picture may be off is not for `quality.max_error_px` to say.
+const SHARP_PX: f64 = 0.1;
 /// Most exposure nodes.
 const MAX_NODES: u32 = 65;
 /// Exposure nodes for each period of the fastest vibration.
@@ -155,7 +163,7 @@ pub(super) fn exposure_nodes(
         skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
         return None;
     }
-    if motion.blur_px <= quality.max_error_px {
+    if motion.blur_px <= quality.max_error_px.min(SHARP_PX) && quality.blur_samples == Auto::Auto {
         skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {:.2e} px", motion.blur_px) });
         return None;
     }
