@@ -7,6 +7,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 pub mod displacement;
 pub mod edges;
+pub mod lines;
 pub mod paper;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.

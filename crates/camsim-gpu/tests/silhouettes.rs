@@ -72,7 +72,8 @@ fn rays_at_silhouettes_agree_with_their_twin() {
     let EdgeStage::Supersampled { scale, samples } = plan.edges else { panic!("{:?}", plan.edges) };
     let fine = fine_samples(&sequence, plan, &plan.key_pose, scale);
     let nearest = fine.iter().map(|sample| sample.inverse_depth).fold(0.0, f64::max);
-    let image = FineImage { size_px: plan.ideal.size_px, scale, samples: &fine };
+    let lines = FineImage::lines_of(plan.ideal.size_px, scale, &fine);
+    let image = FineImage { size_px: plan.ideal.size_px, scale, samples: &fine, lines: &lines };
     let nodes = plan.blur.expect("15 ms blur").nodes;
     let d_uv = [DVec2::new(1.0 / plan.camera.focal_px.x, 0.0), DVec2::new(0.0, 1.0 / plan.camera.focal_px.y)];
     let (mut sum, mut differing, mut compared) = (0.0, 0, 0);
