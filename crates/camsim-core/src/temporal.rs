@@ -8,6 +8,7 @@ use serde::Serialize;
 
 pub mod displacement;
 pub mod edges;
+pub mod lines;
 pub mod paper;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.

@@ -267,8 +267,7 @@ impl IdealPass {
         }
         drop(pass);
         if let Some(fine) = &target.fine {
-            let used_rows = key_rows(&plan.ideal) * (plan.keys.len() as u32 - 1) + plan.ideal.size_px[1];
-            self.resolve.encode(gpu, encoder, [plan.ideal.size_px[0], used_rows], target, fine);
+            self.resolve.encode(gpu, encoder, plan, target, fine);
         }
         middle_lod
     }

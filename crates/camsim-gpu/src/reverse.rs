@@ -326,9 +326,10 @@ impl Variant {
             Vec::new(),
             vec![(0, b.out_color.as_entire_binding())],
         ];
-        let fine = b.fine.map(|fine| (fine.color.create_view(&wgpu::TextureViewDescriptor::default()), fine.depth_view(), &fine.nearest));
-        if let Some((color, depth, nearest)) = &fine {
-            resources[1].extend([(5, view(color)), (6, view(depth)), (7, nearest.as_entire_binding())]);
+        let whole = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let fine = b.fine.map(|fine| (whole(&fine.color), fine.depth_view(), &fine.nearest, whole(&fine.lines)));
+        if let Some((color, depth, nearest, lines)) = &fine {
+            resources[1].extend([(5, view(color)), (6, view(depth)), (7, nearest.as_entire_binding()), (8, view(lines))]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
@@ -364,6 +365,7 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
             entry(5, samples(wgpu::TextureSampleType::Float { filterable: false })),
             entry(6, samples(wgpu::TextureSampleType::Depth)),
             entry(7, storage(true)),
+            entry(8, texture(wgpu::TextureSampleType::Uint)),
         ]);
     }
     let lens = match key.ray {

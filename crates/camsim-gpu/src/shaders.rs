@@ -17,6 +17,7 @@ embedded![
     "common/frame.wgsl",
     "common/noise.wgsl",
     "ideal/fine.wgsl",
+    "ideal/lines.wgsl",
     "ideal/mesh.wgsl",
     "ideal/resolve.wgsl",
     "ideal/surface.wgsl",

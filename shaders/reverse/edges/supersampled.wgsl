@@ -8,6 +8,8 @@
 @group(1) @binding(6) var fine_depth: texture_depth_multisampled_2d;
 // Largest depth value of the ideal frame, as bits.
 @group(1) @binding(7) var<storage, read> nearest: u32;
+// Borders of two surfaces within fine pixels: see ideal/lines.wgsl.
+@group(1) @binding(8) var fine_lines: texture_2d<u32>;
 
 // Golden ratio: multiples are even over an interval for any number of them.
 const GOLDEN: f32 = 0.6180339887;
@@ -18,6 +20,8 @@ const MAX_LOOKS: u32 = 128u;
 const HALVINGS: u32 = 5u;
 // A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
 const GAP_PX: f32 = 0.1;
+// A ray that ends this near to the plain gather's source has met the same, ideal pixels.
+const PLAIN_PX: f32 = 0.25;
 // Depths that agree to within this, in the same measure, are of one surface.
 const SAME_PX: f32 = 0.25;
 
@@ -26,13 +30,46 @@ struct FineSample {
     index: i32,
 }
 
+// The sample that stands for a place: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine pixel,
+// one of the surface on the place's side.
 fn fine_sample(at_px: vec2<f32>) -> FineSample {
     let last = vec2<f32>(frame.ideal_size_px) - 1e-3;
     let at = clamp(at_px + 0.5, vec2<f32>(0.0), last) * f32(frame.edge_scale);
-    let texel = floor(at);
-    let half = vec2<i32>(2.0 * (at - texel));
-    let first_row = key_row() * i32(frame.edge_scale);
-    return FineSample(vec2<i32>(texel) + vec2<i32>(0, first_row), half.x + 2 * half.y);
+    let corner = floor(at);
+    let half = vec2<i32>(2.0 * (at - corner));
+    let texel = vec2<i32>(corner) + vec2<i32>(0, key_row() * i32(frame.edge_scale));
+    let quarter = half.x + 2 * half.y;
+    let line = textureLoad(fine_lines, texel, 0).xy;
+    if (line.x == 0u) {
+        return FineSample(texel, quarter);
+    }
+    let scaled = unpack2x16snorm(line.x);
+    let length = length(scaled);
+    let normal = scaled / length;
+    let nearer = dot(normal, at - corner - 0.5) > 4.0 * length - 2.0;
+    let between = bitcast<f32>(line.y);
+    let own = of_side(texel, quarter, nearer, between);
+    if (own.index >= 0) {
+        return own;
+    }
+    // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has some.
+    let beside = texel + vec2<i32>(round(select(-normal, normal, nearer)));
+    let top = vec2<i32>(0, key_row() * i32(frame.edge_scale));
+    let found = of_side(clamp(beside, top, top + vec2<i32>(frame.ideal_size_px) * i32(frame.edge_scale) - 1), quarter, nearer, between);
+    if (found.index >= 0) {
+        return found;
+    }
+    return FineSample(texel, quarter);
+}
+
+// A sample on one side of a border, the given one if possible; index -1 if there is none.
+fn of_side(texel: vec2<i32>, first: i32, nearer: bool, between: f32) -> FineSample {
+    for (var k = 0; k < 4; k++) {
+        if ((textureLoad(fine_depth, texel, first ^ k) > between) == nearer) {
+            return FineSample(texel, first ^ k);
+        }
+    }
+    return FineSample(texel, -1);
 }
 
 fn fine_inverse_depth(at_px: vec2<f32>) -> f32 {
@@ -92,13 +129,27 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
     return pose;
 }
 
+// Of a pixel whose sources pass no mark: whether nothing moves into it either. Where its parallax passes a silhouette its corners are asked: rays
+// that meet what the plain gather took saw one surface all over the pixel, and that one is better read by the spline.
+fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
+    for (var node = 0u; node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
+        let pose = pose_at_node(pixel, node);
+        if (near_edge(ray.uv, pose)) {
+            for (var k = 0; k < 4; k++) {
+                let uv = ray.uv + (f32(k & 1) - 0.5) * ray.d_dx + (f32(k >> 1u) - 0.5) * ray.d_dy;
+                let met = first_surface(uv, pose);
+                if (!met.seen || distance(met.at_px, temporal_inverse(uv, pose).at_px) > PLAIN_PX) {
+                    return false;
+                }
+            }
+        }
+    }
+    return true;
+}
+
 fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
     // Above 1 where a mark lies under a negative weight of the spline.
-    var edge = abs(plain.color.a - 1.0) > 1e-4;
-    for (var node = 0u; HAS_PARALLAX && !edge && node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
-        edge = near_edge(ray.uv, pose_at_node(pixel, node));
-    }
-    if (!edge) {
+    if (abs(plain.color.a - 1.0) <= 1e-4 && (!HAS_PARALLAX || sees_one_surface(pixel, ray))) {
         return plain;
     }
     var sum = vec3<f32>(0.0);

@@ -2,7 +2,10 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::temporal::{IdealGeometry, InverseDepthImage, Source, edges::steps};
+use crate::temporal::{
+    IdealGeometry, InverseDepthImage, Source,
+    edges::{EDGE_STEP, steps},
+};
 
 /// Side of a tile, texels.
 const TILE: u32 = 8;
@@ -46,8 +49,8 @@ impl DepthEdges {
         for y in 0..height {
             for x in 0..width {
                 let value = depth.values[(y * width + x) as usize];
-                let across = steps(at(x.saturating_sub(1), y), f64::from(value), at((x + 1).min(width - 1), y));
-                let down = steps(at(x, y.saturating_sub(1)), f64::from(value), at(x, (y + 1).min(height - 1)));
+                let across = steps(at(x.saturating_sub(1), y), f64::from(value), at((x + 1).min(width - 1), y), EDGE_STEP);
+                let down = steps(at(x, y.saturating_sub(1)), f64::from(value), at(x, (y + 1).min(height - 1)), EDGE_STEP);
                 let tile = &mut tiles[(y / TILE * columns + x / TILE) as usize];
                 tile.low = tile.low.min(value);
                 tile.high = tile.high.max(value);

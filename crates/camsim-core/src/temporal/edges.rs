@@ -1,9 +1,13 @@
 //! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the one sample of a supersampled ideal
-//! frame that it meets. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`.
+//! frame that it meets. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`; borders within
+//! a pixel are [`super::lines`].
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::IdealGeometry;
+use super::{
+    IdealGeometry,
+    lines::{EdgeLine, edge_line},
+};
 
 /// Golden ratio: its multiples are even over an interval for any number of them.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -15,7 +19,9 @@ const HALVINGS: u32 = 5;
 /// A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
 const GAP_PX: f64 = 0.1;
 /// A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
-const EDGE_STEP: f64 = 0.01;
+pub const EDGE_STEP: f64 = 0.01;
+/// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another picture begins, bends less.
+pub const FINE_EDGE_STEP: f64 = 0.003;
 
 /// One of the four samples of a fine pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +41,8 @@ pub struct FineImage<'a> {
     pub scale: u32,
     /// Row-major fine pixels, four samples each, in the order of [`FineImage::SAMPLE_PLACES`].
     pub samples: &'a [FineSample],
+    /// Borders within fine pixels, as [`FineImage::lines_of`] finds them; empty for none.
+    pub lines: &'a [Option<EdgeLine>],
 }
 
 impl FineImage<'_> {
@@ -42,25 +50,46 @@ impl FineImage<'_> {
     pub const SAMPLE_PLACES: [DVec2; 4] =
         [DVec2::new(0.375, 0.125), DVec2::new(0.875, 0.375), DVec2::new(0.125, 0.625), DVec2::new(0.625, 0.875)];
 
-    /// The sample of the quarter of a fine pixel that holds a position; positions outside go to the border.
+    /// The border within each fine pixel, for [`FineImage::lines`].
+    #[must_use]
+    pub fn lines_of(size_px: [u32; 2], scale: u32, samples: &[FineSample]) -> Vec<Option<EdgeLine>> {
+        let [width, height] = size_px.map(|side| i64::from(side * scale));
+        let depth = |[x, y]: [i64; 2], i: usize| samples[4 * (y * width + x) as usize + i].inverse_depth;
+        (0..width * height).map(|i| edge_line([i % width, i / width], [width, height], &depth)).collect()
+    }
+
+    /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine
+    /// pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
     #[must_use]
     pub fn at(&self, at_px: DVec2) -> FineSample {
-        let [width, height] = self.size_px.map(f64::from);
-        let last = DVec2::new(width, height) - 1e-3;
+        let size_px = self.size_px.map(|side| i64::from(side * self.scale));
+        let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
         let at = (at_px + 0.5).clamp(DVec2::ZERO, last) * f64::from(self.scale);
-        let texel = at.floor();
-        let quarter = (2.0 * (at - texel)).floor();
-        let index = texel.y as usize * (self.size_px[0] * self.scale) as usize + texel.x as usize;
-        self.samples[4 * index + (quarter.x + 2.0 * quarter.y) as usize]
+        let corner = at.floor();
+        let half = (2.0 * (at - corner)).floor();
+        let quarter = half.x as usize + 2 * half.y as usize;
+        let texel = [corner.x as i64, corner.y as i64];
+        let index = |[x, y]: [i64; 2]| (y * size_px[0] + x) as usize;
+        let own = self.samples[4 * index(texel) + quarter];
+        let Some(line) = self.lines.get(index(texel)).copied().flatten() else { return own };
+        let nearer = line.normal.dot(at - corner - 0.5) > line.offset_px;
+        let of_side = |texel: [i64; 2]| {
+            let samples = (0..4).map(|k| self.samples[4 * index(texel) + (quarter ^ k)]);
+            samples.into_iter().find(|sample| (sample.inverse_depth > line.between) == nearer)
+        };
+        // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has some.
+        let towards = if nearer { line.normal } else { -line.normal };
+        let beside = |k: usize| (texel[k] + towards[k].round_ties_even() as i64).clamp(0, size_px[k] - 1);
+        of_side(texel).or_else(|| of_side([beside(0), beside(1)])).unwrap_or(own)
     }
 }
 
 /// Along one direction: a second difference of inverse depth beyond what a smooth surface has (a plane has none), or sky beside a surface.
 #[must_use]
-pub fn steps(before: f64, here: f64, after: f64) -> bool {
+pub fn steps(before: f64, here: f64, after: f64, edge_step: f64) -> bool {
     let high = before.max(here).max(after);
     let low = before.min(here).min(after);
-    (before - 2.0 * here + after).abs() > EDGE_STEP * high || (low == 0.0 && high > 0.0)
+    (before - 2.0 * here + after).abs() > edge_step * high || (low == 0.0 && high > 0.0)
 }
 
 /// Ray `i` of `count` (a power of two): place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
@@ -260,7 +289,7 @@ mod tests {
     #[test]
     fn rays_meet_the_nearest_surface_and_holes_show_the_farther_one() {
         let samples = image(2);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples };
+        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples, lines: &[] };
         for shift_m in [-1.5, -0.4, -0.02, 0.0, 0.02, 0.4, 1.5] {
             let pose = (DMat3::IDENTITY, DVec3::new(shift_m, 0.0, 0.0));
             for k in -400..=400 {
@@ -290,7 +319,7 @@ mod tests {
     #[test]
     fn a_pixel_across_a_border_gets_its_share() {
         let samples = image(2);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples };
+        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples, lines: &[] };
         let pixel = 1.0 / IDEAL.focal_px.x;
         let of = |nodes: &[(DMat3, DVec3)], uv: DVec2| {
             let views = [KeyView { nodes, image }];
@@ -331,8 +360,8 @@ mod tests {
         let images = keys_m.map(seen_from);
         // The line's camera stands at x = 1.2 m, nearer in time to the first key.
         let nodes = keys_m.map(|key_m| [(DMat3::IDENTITY, DVec3::new(1.2 - key_m, 0.0, 0.0))]);
-        let views =
-            [0, 1].map(|k| KeyView { nodes: &nodes[k], image: FineImage { size_px: IDEAL.size_px, scale: 2, samples: &images[k] } });
+        let views = [0, 1]
+            .map(|k| KeyView { nodes: &nodes[k], image: FineImage { size_px: IDEAL.size_px, scale: 2, samples: &images[k], lines: &[] } });
         let mut filled = 0;
         for k in -60..200 {
             let u = f64::from(k) * 2e-3;
@@ -381,16 +410,17 @@ mod tests {
 
     #[test]
     fn planes_have_no_steps() {
-        assert!(!steps(0.001, 0.011, 0.021) && !steps(0.0, 0.0, 0.0));
-        assert!(steps(0.01, 0.01, 0.02) && steps(0.0, 0.0, 0.01) && steps(0.01, 0.01, 0.0));
+        assert!(!steps(0.001, 0.011, 0.021, EDGE_STEP) && !steps(0.0, 0.0, 0.0, EDGE_STEP));
+        assert!(steps(0.01, 0.01, 0.02, EDGE_STEP) && steps(0.0, 0.0, 0.01, EDGE_STEP) && steps(0.01, 0.01, 0.0, EDGE_STEP));
+        assert!(!steps(0.01, 0.01, 0.010_05, EDGE_STEP) && steps(0.01, 0.01, 0.010_05, FINE_EDGE_STEP));
         // No depth is no step and no panic.
-        assert!(!steps(f64::NAN, f64::NAN, f64::NAN));
+        assert!(!steps(f64::NAN, f64::NAN, f64::NAN, EDGE_STEP));
     }
 
     #[test]
     fn a_ray_that_is_not_a_number_has_some_place() {
         let samples = image(1);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 1, samples: &samples };
+        let image = FineImage { size_px: IDEAL.size_px, scale: 1, samples: &samples, lines: &[] };
         for uv in [DVec2::NAN, DVec2::splat(f64::INFINITY), DVec2::splat(1e300)] {
             let at_px = first_surface(uv, (DMat3::IDENTITY, DVec3::splat(0.5)), ROOF, &image, &IDEAL).at_px;
             let _ = image.at(at_px);

@@ -1,8 +1,8 @@
 //! Supersampled ideal frames: their textures, and the pass that resolves them to one colour and depth a pixel.
 
-use camsim_core::plan::EdgeStage;
+use camsim_core::plan::{EdgeStage, FramePlan};
 
-use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW};
+use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW, key_rows};
 use crate::{
     context::GpuContext,
     shaders::{self, ComposeError},
@@ -10,6 +10,8 @@ use crate::{
 
 /// Samples of a fine pixel; every adapter has 4, at the standard places.
 pub const FINE_SAMPLES: u32 = 4;
+/// A packed normal and offset, and the depth value between the surfaces.
+const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
 /// Edge of the square workgroups.
 const WORKGROUP_PX: u32 = 8;
 
@@ -26,6 +28,10 @@ pub struct FineTarget {
     pub averaged: wgpu::Texture,
     /// One u32: the bits of the frame's largest near / z.
     pub nearest: wgpu::Buffer,
+    /// Borders of two surfaces within fine pixels: `shaders/ideal/lines.wgsl`.
+    pub lines: wgpu::Texture,
+    /// Four u32: width and height of an ideal frame and the rows from one to the next, for the resolve pass.
+    layout: wgpu::Buffer,
 }
 
 /// Fine pixels along a side of an ideal pixel, for frames that need any.
@@ -66,8 +72,17 @@ impl FineTarget {
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
+        let layout = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("camsim.ideal.layout"),
+            size: 16,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
         Self {
             scale,
+            lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
+            layout,
             color: texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage),
             depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
             averaged: texture(gpu, "camsim.ideal.averaged_color", size_px, COLOR_FORMAT, 1, usage),
@@ -96,7 +111,7 @@ impl ResolvePass {
         let view_dimension = wgpu::TextureViewDimension::D2;
         let read = |sample_type, multisampled| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
         let write = |format| wgpu::BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension };
-        let nearest = wgpu::BufferBindingType::Storage { read_only: false };
+        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("camsim.ideal.resolve"),
             entries: &[
@@ -104,7 +119,9 @@ impl ResolvePass {
                 entry(1, read(wgpu::TextureSampleType::Float { filterable: false }, false)),
                 entry(2, write(COLOR_FORMAT)),
                 entry(3, write(wgpu::TextureFormat::R32Float)),
-                entry(4, wgpu::BindingType::Buffer { ty: nearest, has_dynamic_offset: false, min_binding_size: None }),
+                entry(4, buffer(wgpu::BufferBindingType::Storage { read_only: false })),
+                entry(5, buffer(wgpu::BufferBindingType::Uniform)),
+                entry(6, write(LINES_FORMAT)),
             ],
         });
         let module = shaders::module(device, "camsim.ideal.resolve", "ideal/resolve.wgsl", &[])?;
@@ -124,17 +141,22 @@ impl ResolvePass {
         Ok(Self { layout, pipeline })
     }
 
-    /// Records the resolve of `size_px` ideal pixels.
+    /// Records the resolve of a plan's ideal frames.
     pub(super) fn encode(
         &self,
         gpu: &GpuContext,
         encoder: &mut wgpu::CommandEncoder,
-        size_px: [u32; 2],
+        plan: &FramePlan,
         target: &IdealTarget,
         fine: &FineTarget,
     ) {
+        let (rows, last) = (key_rows(&plan.ideal), plan.keys.len() as u32 - 1);
+        let size_px = [plan.ideal.size_px[0], rows * last + plan.ideal.size_px[1]];
+        let layout = [plan.ideal.size_px[0], plan.ideal.size_px[1], rows, 0];
+        gpu.queue.write_buffer(&fine.layout, 0, bytemuck::cast_slice(&layout));
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (depth_samples, averaged, color, depth) = (fine.depth_view(), view(&fine.averaged), view(&target.color), view(&target.depth));
+        let lines = view(&fine.lines);
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("camsim.ideal.resolve"),
@@ -145,6 +167,8 @@ impl ResolvePass {
                 entry(2, wgpu::BindingResource::TextureView(&color)),
                 entry(3, wgpu::BindingResource::TextureView(&depth)),
                 entry(4, fine.nearest.as_entire_binding()),
+                entry(5, fine.layout.as_entire_binding()),
+                entry(6, wgpu::BindingResource::TextureView(&lines)),
             ],
         });
         encoder.clear_buffer(&fine.nearest, 0, None);

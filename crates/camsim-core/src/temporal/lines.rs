@@ -1,0 +1,192 @@
+//! The border of two surfaces within a pixel of a supersampled ideal frame, as a straight line through the samples around it. f64 twin of
+//! `shaders/ideal/lines.wgsl`.
+//!
+//! Four samples know the share of a pixel that a surface covers to 0.09 RMS. All samples along eight pixels of a straight border know it to 0.03.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::edges::FineImage;
+
+/// Half of the length along which samples must agree on a line, fine pixels: tried in this order.
+const REACH: [f64; 2] = [4.0, 2.0];
+/// Samples this near to the line take part, fine pixels.
+const BAND: f64 = 0.7;
+/// A sample may lie this far on the wrong side.
+const SLACK: f64 = 0.05;
+/// A line farther from the middle of its pixel misses it.
+const FARTHEST: f64 = 0.72;
+/// Holds the slope of the logistic curve down; a separable set has no steepest one.
+const RIDGE: f64 = 0.03;
+const MOST_MEMBERS: usize = 64;
+/// Samples that differ by less than this, relative to the nearest, are of one surface.
+const ONE_SURFACE: f64 = 0.02;
+
+/// A border: the nearer surface is where `normal · x > offset_px`, x in fine pixels from the middle of the fine pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeLine {
+    /// Unit vector towards the nearer surface.
+    pub normal: DVec2,
+    /// Fine pixels, within ±0.72.
+    pub offset_px: f64,
+    /// Inverse depth between those of the two surfaces, 1/m.
+    pub between: f64,
+}
+
+/// A sample that takes part: its place, and 1 for the nearer surface or 0 for the farther.
+type Member = (DVec2, f64);
+
+/// The line through a fine pixel, or `None`: one surface, more than two, or a corner. `inverse_depth` gives a sample of a fine pixel, in the
+/// order of [`FineImage::SAMPLE_PLACES`]; it is asked for fine pixels within `size_px` alone.
+///
+/// Logistic regression by Newton's method: first over the 3x3 fine pixels around, then over the band along the line that was found. A line
+/// counts if all members lie on their side.
+#[must_use]
+pub fn edge_line(fine_pixel: [i64; 2], size_px: [i64; 2], inverse_depth: &dyn Fn([i64; 2], usize) -> f64) -> Option<EdgeLine> {
+    let at = |step: [i64; 2]| {
+        let [x, y] = [fine_pixel[0] + step[0], fine_pixel[1] + step[1]];
+        (x >= 0 && y >= 0 && x < size_px[0] && y < size_px[1]).then_some([x, y])
+    };
+    let samples = |step: [i64; 2]| {
+        at(step).into_iter().flat_map(move |pixel| {
+            (0..4).map(move |i| (DVec2::new(step[0] as f64, step[1] as f64) + FineImage::SAMPLE_PLACES[i] - 0.5, inverse_depth(pixel, i)))
+        })
+    };
+    let around: Vec<(DVec2, f64)> = (0..9).flat_map(|k| samples([k % 3 - 1, k / 3 - 1])).collect();
+    let (low, high) = around.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s.1), high.max(s.1)));
+    if low >= (1.0 - ONE_SURFACE) * high {
+        return None;
+    }
+    let between = 0.5 * (low + high);
+    let member = |(place, w): (DVec2, f64)| (place, f64::from(u8::from(w > between)));
+    let (normal, offset_px) = fitted(&around.into_iter().map(member).collect::<Vec<_>>(), 3).filter(|line| line.1.abs() <= 1.0)?;
+    REACH
+        .into_iter()
+        .find_map(|reach| {
+            let members: Vec<Member> = along(normal, offset_px, reach)
+                .into_iter()
+                .flat_map(|step| samples(step).map(move |sample| (step, sample)))
+                .filter(|(step, (place, _))| {
+                    *step == [0, 0] || ((normal.dot(*place) - offset_px).abs() < BAND && normal.perp_dot(*place).abs() < reach)
+                })
+                .map(|(_, sample)| member(sample))
+                .take(MOST_MEMBERS)
+                .collect();
+            let (normal, offset_px) = fitted(&members, 4)?;
+            separates(normal, offset_px, &members).then_some(EdgeLine { normal, offset_px, between })
+        })
+        .filter(|line| line.offset_px.abs() < FARTHEST)
+}
+
+/// Fine pixels along a line, and one to both sides of it.
+fn along(normal: DVec2, offset_px: f64, reach: f64) -> Vec<[i64; 2]> {
+    let flat = normal.y.abs() >= normal.x.abs();
+    let major = if flat { normal } else { DVec2::new(normal.y, normal.x) };
+    let last = reach as i64;
+    (-last..=last)
+        .flat_map(|along| {
+            let middle = ((offset_px - major.x * along as f64) / major.y).round() as i64;
+            (middle - 1..=middle + 1).map(move |across| if flat { [along, across] } else { [across, along] })
+        })
+        .collect()
+}
+
+/// Normal and offset after `steps` steps; `None` if it has no direction.
+fn fitted(members: &[Member], steps: u32) -> Option<(DVec2, f64)> {
+    let line = (0..steps).fold(DVec3::ZERO, |line, _| step(line, members));
+    let length = line.truncate().length();
+    (length > 1e-9 && line.is_finite()).then(|| (line.truncate() / length, line.z / length))
+}
+
+/// One step of Newton's method for logistic regression of a line n x = c, unknowns (n, c).
+fn step(line: DVec3, members: &[Member]) -> DVec3 {
+    let mut gradient = DVec3::new(RIDGE * line.x, RIDGE * line.y, 0.0);
+    let mut matrix = DMat3::from_diagonal(DVec3::new(RIDGE, RIDGE, 1e-4));
+    for (place, nearer) in members {
+        let at = place.extend(-1.0);
+        let share = 1.0 / (1.0 + (-line.dot(at)).exp());
+        gradient += (share - nearer) * at;
+        let weight = share * (1.0 - share);
+        matrix += DMat3::from_cols(at * at.x, at * at.y, at * at.z) * weight;
+    }
+    line - matrix.inverse() * gradient
+}
+
+/// Whether all members lie on their side, and there are some on both.
+fn separates(normal: DVec2, offset_px: f64, members: &[Member]) -> bool {
+    let on_side = |&(place, nearer): &Member| (2.0 * nearer - 1.0) * (normal.dot(place) - offset_px) > -SLACK;
+    let nearer = members.iter().filter(|member| member.1 > 0.5).count();
+    members.iter().all(on_side) && nearer > 0 && nearer < members.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: i64 = 13;
+
+    /// The line of the middle pixel of a picture of two surfaces, and the share of that pixel's samples on the nearer one.
+    fn of(nearer: &dyn Fn(DVec2) -> bool) -> (Option<EdgeLine>, f64) {
+        let middle = SIDE / 2;
+        let depth = |[x, y]: [i64; 2], i: usize| {
+            let place = DVec2::new((x - middle) as f64, (y - middle) as f64) + FineImage::SAMPLE_PLACES[i] - 0.5;
+            if nearer(place) { 1.0 / 40.0 } else { 1.0 / 60.0 }
+        };
+        let own = (0..4).filter(|&i| depth([middle; 2], i) > 0.02).count() as f64 / 4.0;
+        (edge_line([middle; 2], [SIDE; 2], &depth), own)
+    }
+
+    fn share(nearer: &dyn Fn(DVec2) -> bool) -> f64 {
+        const N: u32 = 48;
+        let place = |i: u32| DVec2::new(f64::from(i % N) + 0.5, f64::from(i / N) + 0.5) / f64::from(N) - 0.5;
+        (0..N * N).filter(|&i| nearer(place(i))).count() as f64 / f64::from(N * N)
+    }
+
+    #[test]
+    fn a_straight_border_is_known_to_a_few_hundredths() {
+        let (mut by_line, mut by_samples, mut count, mut without) = (0.0, 0.0, 0.0, 0);
+        for k in 0..900 {
+            let angle = f64::from(k) * 2.399_963;
+            let offset = 1.3 * (f64::from(k) * 0.618_034).fract() - 0.65;
+            let normal = DVec2::from_angle(angle);
+            let truth = share(&|place| normal.dot(place) > offset);
+            if truth <= 0.0 || truth >= 1.0 {
+                continue;
+            }
+            let (line, own) = of(&|place| normal.dot(place) > offset);
+            let found = line.map_or(own, |line| share(&|place| line.normal.dot(place) > line.offset_px));
+            without += u32::from(line.is_none());
+            by_line += (found - truth).powi(2);
+            by_samples += (own - truth).powi(2);
+            count += 1.0;
+        }
+        let [by_line, by_samples] = [by_line, by_samples].map(|sum: f64| (sum / count).sqrt());
+        assert!(count > 500.0 && f64::from(without) < 0.03 * count, "{without} of {count}");
+        assert!(by_line < 0.034 && by_samples > 0.08, "{by_line:.4} {by_samples:.4}");
+    }
+
+    #[test]
+    fn what_is_no_line_has_none() {
+        assert_eq!(of(&|_| true).0, None);
+        // A strip thinner than a pixel, and a corner in the middle of the pixel: no line has all samples on its sides.
+        for k in 0..40 {
+            let (x, y) = (DVec2::from_angle(f64::from(k) * 0.7), DVec2::from_angle(f64::from(k) * 0.7 + 1.57));
+            assert_eq!(of(&|place| x.dot(place).abs() < 0.3).0, None, "strip {k}");
+            let corner = of(&|place| x.dot(place) > 0.0 && y.dot(place) > 0.0).0;
+            assert_eq!(corner, None, "corner {k}");
+        }
+        // Nothing finite, no panic.
+        assert_eq!(edge_line([3, 3], [7, 7], &|_, _| f64::NAN), None);
+    }
+
+    #[test]
+    fn lines_end_with_the_picture() {
+        let depth = |[x, y]: [i64; 2], i: usize| {
+            assert!((0..7).contains(&x) && (0..7).contains(&y), "{x} {y}");
+            if x as f64 + FineImage::SAMPLE_PLACES[i].x > 0.4 { 0.02 } else { 0.01 }
+        };
+        for y in 0..7 {
+            let line = edge_line([0, y], [7, 7], &depth).expect("a border");
+            assert!((line.normal.x - 1.0).abs() < 0.02 && (line.offset_px + 0.1).abs() < 0.2, "{line:?}");
+        }
+    }
+}
