@@ -295,6 +295,8 @@ impl Report {
                 }
             }
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // Methods with the same plans are one point.
+            points.dedup();
             let mut least = f64::INFINITY;
             let (front, rest): (Vec<_>, Vec<_>) = points.into_iter().partition(|&(_, rms_px)| {
                 let better = rms_px < least;
