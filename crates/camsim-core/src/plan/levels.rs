@@ -29,6 +29,9 @@ use crate::{
 
 /// Probes that are looked at, at most.
 const SIGHTS: usize = 32;
+/// Of which one in so many are asked first, and how far above the tolerance they then settle it.
+const FEW: usize = 4;
+const FAR: f64 = 1.7;
 /// Times what is expected: textures are not equally grainy everywhere.
 const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
@@ -41,7 +44,7 @@ const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
-/// Costs beside one bilinear read of an output pixel: an ideal pixel, and a read of the spline. Measured on llvmpipe.
+/// Costs beside one bilinear read of an output pixel: an ideal pixel, and a read of the spline. Rough, from frame times on llvmpipe.
 const IDEAL_COST: f64 = 20.0;
 const SPLINE_COST: f64 = 6.0;
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -160,12 +163,17 @@ impl<'a> Prospect<'a> {
 
     /// What is to be expected of a way of sampling.
     pub fn expect(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
-        let [exact, sampled] = self.squares(scale, taps, blur);
+        self.expect_at(1, scale, taps, blur)
+    }
+
+    /// The same from one place of `every`.
+    fn expect_at(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
+        let [exact, sampled] = self.squares(every, scale, taps, blur);
         Expected { resampling_dn: dn(exact), blur_dn: SAFETY * 255.0 * (sampled - exact).max(0.0).sqrt() }
     }
 
     /// Mean squared errors with the exposure exact, and with its samples.
-    fn squares(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> [f64; 2] {
+    fn squares(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> [f64; 2] {
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
@@ -180,8 +188,11 @@ impl<'a> Prospect<'a> {
             let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
             error.map(|square| sight.gain * sight.gain * square)
         };
-        let sums = self.sights.par_iter().map(of).reduce(|| [0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
-        sums.map(|sum| sum / self.counted.max(1) as f64)
+        // Summed in their order: a plan does not depend on how threads share work.
+        let squares: Vec<[f64; 2]> = self.sights.par_iter().step_by(every).map(of).collect();
+        let sums = squares.iter().fold([0.0; 2], |sum, square| [sum[0] + square[0], sum[1] + square[1]]);
+        let part = squares.len() as f64 / self.sights.len().max(1) as f64;
+        sums.map(|sum| sum / (part * self.counted as f64).max(1.0))
     }
 
     /// The cheapest sampling within the tolerance, or the best there is. The scale is not below `least_scale`, and that at which the
@@ -201,26 +212,38 @@ impl<'a> Prospect<'a> {
             Some(samples) => vec![f64::from(samples)],
             None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
         };
-        let mut best: Option<Sampling> = None;
+        let way = |scale: f64, taps: TapStage, samples_per_px: f64| {
+            let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
+            let blur = (nodes > 1).then_some(BlurStage { nodes, one_depth: false, samples_per_px, max_samples });
+            (Sampling { scale, taps, samples_per_px, expected: Expected::default() }, blur)
+        };
+        // A few places tell what is far from keeping the tolerance.
+        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expect_at(FEW, sampling.scale, sampling.taps, blur).total_dn();
+        let exactly = |(sampling, blur): (Sampling, _)| {
+            let expected = self.expect(sampling.scale, sampling.taps, blur);
+            Sampling { expected, ..sampling }
+        };
+        let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;
         for (_, scale, taps) in ways {
             // The most samples first: if those do not do, fewer need not be tried.
             let choices = if nodes > 1 { per_px(scale) } else { vec![0.0] };
-            let expect = |samples_per_px: f64| {
-                let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
-                let blur = (nodes > 1).then_some(BlurStage { nodes, one_depth: false, samples_per_px, max_samples });
-                Sampling { scale, taps, samples_per_px, expected: self.expect(scale, taps, blur) }
-            };
-            let Some(most) = choices.last().map(|&samples| expect(samples)) else { continue };
-            if most.expected.total_dn() > tolerance_dn {
-                if best.is_none_or(|best| most.expected.total_dn() < 0.95 * best.expected.total_dn()) {
-                    best = Some(most);
+            let Some((&last, fewer)) = choices.split_last() else { continue };
+            let most = way(scale, taps, last);
+            let rough_dn = roughly_dn(most);
+            let tried = Some(most).filter(|_| rough_dn <= FAR * tolerance_dn).map(exactly);
+            let total_dn = tried.map_or(rough_dn, |tried| tried.expected.total_dn());
+            match tried.filter(|_| total_dn <= tolerance_dn) {
+                None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
+                None => {}
+                Some(most) => {
+                    let fewer = fewer.iter().map(|&samples| way(scale, taps, samples));
+                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(exactly);
+                    return { near }.find(|way| way.expected.total_dn() <= tolerance_dn).unwrap_or(most);
                 }
-                continue;
             }
-            let fewer = choices[..choices.len() - 1].iter().map(|&samples| expect(samples));
-            return { fewer }.find(|way| way.expected.total_dn() <= tolerance_dn).unwrap_or(most);
         }
-        best.unwrap_or(Sampling { scale: least_scale, taps: TapStage::Spline, samples_per_px: 2.0, expected: Expected::default() })
+        let none = Sampling { scale: least_scale, taps: TapStage::Spline, samples_per_px: 2.0, expected: Expected::default() };
+        best.map_or(none, |(_, way)| exactly(way))
     }
 
     /// Ways of reading the ideal frame at a scale.
