@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::{
     Picture, Report, ReproduceError, Setup, Table,
-    circles::{matches, spots},
+    circles::{LEAST_PX, matches, spots},
     pattern::Seen,
     rig, short,
 };
@@ -170,6 +170,9 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
          only camsim's own error and that of finding circles."
     ));
     let found = [find(setup, 0, u64::MAX)?, find(setup, 1, u64::MAX)?];
+    for (calibration, _) in calibrations(setup.width_px).iter().zip(&found).filter(|(_, found)| found.pairs.is_empty()) {
+        return Err(ReproduceError::NoCircle { calibration: calibration.name, width_px: setup.width_px, least_px: LEAST_PX });
+    }
     let mut table = Table::new(
         "Centres of the area of the circles, px",
         &[
@@ -207,16 +210,18 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     if setup.data.is_some() {
         report.tables.push(("calibrations", between(&found)));
     }
-    report.plots.push((
-        "radius",
-        Plot {
+    if series.iter().any(|series| !series.points.is_empty()) {
+        let plot = Plot {
             title: "Error of circle centres by their place in the picture".into(),
             x_label: "distance from the principal point, px".into(),
             y_label: "error, px RMS".into(),
             log: [false, false],
             series,
-        },
-    ));
+        };
+        report.plots.push(("radius", plot));
+    } else {
+        report.notes.push(format!("No plot by radius: no ring of the picture has {RING_CIRCLES} circles found; wider pictures have more."));
+    }
     report.tables.push(("inverse", inverse(setup)?));
     let [opencv, agisoft] = found;
     let mut shown = Vec::new();
