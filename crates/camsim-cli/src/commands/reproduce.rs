@@ -51,7 +51,7 @@ pub struct Args {
     /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/, terrain/
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In small ones lens finds no circle: 240 is enough
+    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In those of 128 px and less lens finds no circle
     #[arg(long, value_name = "PX", default_value_t = 640)]
     width: u32,
 }
