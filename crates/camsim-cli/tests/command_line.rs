@@ -361,8 +361,10 @@ fn somebody_elses_picture_goes_through_the_camera() {
     assert_eq!(camsim(["-q", "apply", text(&camera), text(&frame), "--preset", "paper", "-o", text(&file("out.exr"))]).0, 0);
     assert!(file("out.exr").is_file());
 
-    let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "--preset", "paper", "--solver", "reproject", "-o", text(&out)]);
-    assert!(code == 2 && err.contains("--solver: the solver is rk2"), "{err}");
+    for (solver, expected) in [("reproject", 2), ("linear", 2), ("rk2", 0)] {
+        let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "--preset", "paper", "--solver", solver, "-o", text(&out)]);
+        assert!(code == expected && err.contains("--solver is rk2 with --preset paper") == (code == 2), "{solver}: {err}");
+    }
 
     // All sky is a picture; that a velocity then changes nothing is said.
     let png = fs::read(file("ideal.png")).unwrap();

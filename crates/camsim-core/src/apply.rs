@@ -75,9 +75,6 @@ pub enum ApplyError {
     /// A solver that needs a scene.
     #[error("solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)")]
     Oracle,
-    /// Another solver than the paper's with its preset.
-    #[error("the solver is rk2 (eq. 18) with the preset \"paper\": leave the solver out, or use the preset \"default\"")]
-    PaperSolver,
     /// Linear fog outside of the paper's preset.
     #[error(
         "fog is a part of the ideal frame; the linear fog added afterwards belongs to the paper's methods: use the preset \"paper\", or leave fog out"
@@ -131,7 +128,8 @@ impl IdealFrame {
 pub struct Settings {
     /// Whose methods.
     pub preset: Preset,
-    /// Temporal inverse; by default [`Solver::Reproject`]. The paper's preset takes [`Solver::Rk2`] and no other.
+    /// Temporal inverse; by default [`Solver::Reproject`]. The paper's preset takes [`Solver::Rk2`]; another one beside it
+    /// leaves its other methods as they are, which tells its causes of error apart.
     pub solver: Option<Solver>,
     /// Samples over the exposure; `None` chooses by the length of the path (100 in the paper's preset).
     pub blur_samples: Option<u32>,
@@ -184,9 +182,6 @@ impl<'a> Pipeline<'a> {
         let solver = settings.solver.unwrap_or(if paper { Solver::Rk2 } else { Solver::Reproject });
         if solver == Solver::Oracle {
             return Err(ApplyError::Oracle);
-        }
-        if paper && solver != Solver::Rk2 {
-            return Err(ApplyError::PaperSolver);
         }
         let depth = InverseDepthImage { size_px: frame.geometry.size_px, values: &frame.inverse_depth };
         let edges = DepthEdges::new(&depth);

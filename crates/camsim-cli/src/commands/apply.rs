@@ -87,6 +87,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             args.output.display()
         )));
     }
+    // As a scenario does.
+    if args.preset == PresetArg::Paper && args.solver.is_some_and(|solver| solver != SolverArg::Rk2) {
+        return Err(Failure::bad_input(anyhow!("--solver is rk2 with --preset paper; leave it out, or leave --preset out")));
+    }
     let spec = read_checked_camera(&args.camera).or_bad_input()?;
     for (present, key) in [(!spec.zoom.is_empty(), "zoom"), (!spec.mount.vibration.is_empty(), "mount.vibration")] {
         if present {
@@ -137,7 +141,7 @@ fn in_file(args: &Args, error: &ApplyError) -> anyhow::Error {
     let file = match error {
         ApplyError::Camera(_) | ApplyError::Shutter(_) => &args.camera,
         ApplyError::Frame { .. } | ApplyError::Motion(_) | ApplyError::Fog => &args.frame,
-        ApplyError::Oracle | ApplyError::PaperSolver => return anyhow!("--solver: {error}"),
+        ApplyError::Oracle => return anyhow!("--solver: {error}"),
     };
     anyhow!("{}: {error}", file.display())
 }

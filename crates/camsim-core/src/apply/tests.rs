@@ -184,15 +184,6 @@ fn a_turn_within_the_exposure_is_an_arc() {
 }
 
 #[test]
-fn the_papers_preset_takes_its_own_solver_only() {
-    let (spec, ideal) = (camera([4, 3], 10.0, ShutterSpec::default()), frame([4, 3], 10.0, |_| (0.02, [0.0; 3])));
-    let motion = Motion::Twist(Twist::default());
-    let taken = |solver| Pipeline::new(&spec, &ideal, &motion, &Settings { preset: Preset::Paper, solver, ..Settings::default() }).is_ok();
-    assert!(taken(None) && taken(Some(Solver::Rk2)));
-    assert!(!taken(Some(Solver::Linear)) && !taken(Some(Solver::Reproject)) && !taken(Some(Solver::Oracle)));
-}
-
-#[test]
 fn fog_belongs_to_the_papers_preset() {
     let fog = paper::LinearFog { end_m: 100.0, color: DVec3::new(0.5, 0.6, 0.7) };
     assert_eq!(fog.over(DVec3::ZERO, DVec2::ZERO, 0.02), fog.color * 0.5);
