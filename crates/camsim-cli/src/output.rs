@@ -3,7 +3,7 @@
 use std::{
     fs::File,
     io::{self, BufWriter, Write},
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 use anyhow::Context;
@@ -25,10 +25,41 @@ pub fn write_output(
     }
 }
 
-fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+/// Refuses, before any work is done, a file that could not be written at its end. Nothing of it is made.
+///
+/// # Errors
+/// As [`write_output`] would fail.
+pub fn check_output(path: &Path) -> Result<(), Failure> {
+    let tried = part_of(path).and_then(|part| if path.is_dir() { Err(io::ErrorKind::IsADirectory.into()) } else { touch(&part) });
+    tried.with_context(|| format!("{}: cannot be written", path.display())).or_failed()
+}
+
+/// The same for a folder, which is made.
+///
+/// # Errors
+/// It cannot be made, or no file can be made in it.
+pub fn check_folder(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: cannot be made; choose another folder with -o", folder.display()))
+        .or_failed()?;
+    let tried = part_of(&folder.join("camsim")).and_then(|part| touch(&part));
+    tried.with_context(|| format!("{}: cannot be written to; choose another folder with -o", folder.display())).or_failed()
+}
+
+fn touch(part: &Path) -> io::Result<()> {
+    File::create(part)?;
+    std::fs::remove_file(part)
+}
+
+/// The name that a file has while it is written.
+fn part_of(path: &Path) -> io::Result<PathBuf> {
     let mut name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?.to_owned();
     name.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(name);
+    Ok(path.with_file_name(name))
+}
+
+fn write_file(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let part = part_of(path)?;
     let written = File::create(&part).and_then(|file| {
         let mut file = BufWriter::new(file);
         fill(&mut file)?;
@@ -47,6 +78,20 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
+
+    #[test]
+    fn what_cannot_be_written_is_known_before_the_work() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out.csv");
+        check_output(&path).unwrap();
+        assert!(check_output(folder.path()).is_err() && check_output(&folder.path().join("none/out.csv")).is_err());
+        check_folder(&folder.path().join("a/b")).unwrap();
+        std::fs::write(&path, "a file").unwrap();
+        assert!(check_folder(&path).is_err() && check_folder(&path.join("below")).is_err());
+        check_output(&path).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"a file", "what is there stays");
+        assert_eq!(std::fs::read_dir(folder.path().join("a/b")).unwrap().count(), 0);
+    }
 
     #[test]
     fn a_file_is_whole_or_absent() {

@@ -291,6 +291,9 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["compare", &picture, &other], "acircles.png"),
         (vec!["compare", &picture, "nowhere.png"], "nowhere.png"),
         (vec!["completions", "tcsh"], "zsh"),
+        (vec!["bench", "--plot", "curve.png"], "must end in .svg"),
+        (vec!["render", &scenario, "--set", "quality.blur_samples=4294967296"], "up to 4096"),
+        (vec!["render", &scenario, "--set", "quality.iterations=4294967295"], "quality.iterations: must be 1 to 64"),
     ];
     let mut faults = Vec::new();
     for (args, wanted) in cases {
@@ -311,6 +314,28 @@ fn a_folder_that_cannot_be_written_is_a_failure_of_the_work() {
     let below = file.join("traj.csv");
     let (code, _, err) = camsim(["track", text(&assets().join("pattern.toml")), "--rate", "1", "-o", text(&below)]);
     assert!(code == 1 && err.contains("traj.csv"), "{err}");
+    // Long work is refused before it begins.
+    for (args, name) in [
+        (vec!["bench", "--csv", text(&below)], "traj.csv"),
+        (vec!["bench", "--plot", text(&below.with_extension("svg"))], "traj.svg"),
+        (vec!["bench", "-o", text(&below)], "traj.csv"),
+        (vec!["reproduce", "speed", "-o", text(&below)], "traj.csv"),
+    ] {
+        let (code, out, err) = camsim(args.clone());
+        assert!(code == 1 && out.is_empty() && err.contains(name) && err.starts_with("error: "), "{args:?}: {code} {err}");
+        assert!(!err.contains("--resume"), "{err}");
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn one_experiment_without_circles_does_not_stop_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, out, err) = camsim(["reproduce", "lens", "interlace", "--width", "96", "-o", text(folder.path())]);
+    assert_eq!(code, 1, "{err}");
+    assert!(err.contains("lens: error: no circle of the target was found") && err.contains("96 px wide"), "{err}");
+    assert!(err.contains("1 of 2 experiments were not done: lens"), "{err}");
+    assert!(out.contains("8.7, fig. 20") && folder.path().join("interlace/report.md").is_file(), "{out}");
 }
 
 #[test]
@@ -336,11 +361,32 @@ fn somebody_elses_picture_goes_through_the_camera() {
     assert_eq!(camsim(["-q", "apply", text(&camera), text(&frame), "--preset", "paper", "-o", text(&file("out.exr"))]).0, 0);
     assert!(file("out.exr").is_file());
 
+    for (solver, expected) in [("reproject", 2), ("linear", 2), ("rk2", 0)] {
+        let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "--preset", "paper", "--solver", solver, "-o", text(&out)]);
+        assert!(code == expected && err.contains("--solver is rk2 with --preset paper") == (code == 2), "{solver}: {err}");
+    }
+
+    // All sky is a picture; that a velocity then changes nothing is said.
+    let png = fs::read(file("ideal.png")).unwrap();
+    // Width and height stand in a PNG's first chunk.
+    let [width, height] = [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()));
+    let sky: Vec<u8> = format!("P5\n{width} {height}\n65535\n").bytes().chain(vec![0; 2 * (width * height) as usize]).collect();
+    fs::write(file("sky.pgm"), sky).unwrap();
+    let depth = "depth = \"sky.pgm\"\ndepth_per_metre = 1000\n[motion]";
+    fs::write(&frame, turning.replace("[motion]", depth).replace("angular_rate_rad_s", "velocity_m_s")).unwrap();
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
+    assert!(code == 0 && err.contains("FRAME.toml: no pixel has a depth"), "{err}");
+    fs::write(file("poses.csv"), "t_s,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,1,0,0,1,0,0,0\n").unwrap();
+
     for (change, wanted) in [
         (turning.replace("color =", "colour ="), "did you mean `color`?"),
         (turning.replace("angular_rate_rad_s", "velocity_m_s"), "depth: is missing"),
         (turning.replace("ideal.png", "none.png"), "none.png: cannot be read"),
-        (format!("{turning}[fog]\nend_m = 10.0\ncolor = [0.0, 0.0, 0.0]\n"), "preset \"paper\""),
+        (format!("{turning}[fog]\nend_m = 10.0\ncolor = [0.0, 0.0, 0.0]\n"), "FRAME.toml: fog is a part of the ideal frame"),
+        (
+            turning.replace("angular_rate_rad_s = [0.0, 0.0, 1.0]", "trajectory = \"poses.csv\"\nstamp_s = 9.0").replace("[motion]", depth),
+            "FRAME.toml: the trajectory covers",
+        ),
     ] {
         fs::write(&frame, change).unwrap();
         let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
@@ -348,6 +394,9 @@ fn somebody_elses_picture_goes_through_the_camera() {
     }
     let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", "picture.jpg"]);
     assert!(code == 2 && err.contains(".exr or .png"), "{err}");
+    fs::write(&camera, "[camera]\nsize_px = [64, 48]\n").unwrap();
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
+    assert!(code == 2 && err.contains("CAMERA.toml:1: camera: a CAMERA.toml has the keys of [camera] at its root"), "{err}");
     fs::write(&camera, "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = -33.0\n").unwrap();
     let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
     assert!(code == 2 && err.contains("shutter.readout_ms: must be"), "{err}");

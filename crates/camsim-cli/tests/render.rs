@@ -123,6 +123,21 @@ fn the_reference_renders_without_an_adapter() {
     let run = run_json(&whole);
     assert!(run["adapter"].as_str().is_some_and(|adapter| adapter.starts_with("reference (f64 rays, ")), "{run}");
     assert_eq!(run["scenario"]["quality"]["solver"], "oracle");
+
+    // What names methods of its own would get the oracle's picture instead.
+    for (more, wanted) in [
+        (vec!["--preset", "paper"], "quality.preset = \"paper\" does not go with --backend reference"),
+        (vec!["--set", "quality.solver=rk2"], "quality.solver = \"rk2\" does not go"),
+        (vec!["--set", "quality.solver=linear"], "quality.solver = \"linear\" does not go"),
+        (vec!["--set", "quality.solver=reproject"], "quality.solver = \"reproject\" does not go"),
+        (vec!["--set", "quality.iterations=3"], "quality.iterations: counts the depth look-ups"),
+    ] {
+        let refused = folder("refused");
+        let (code, _, err) = render(&refused, &[&["--frames", "2", "--backend", "reference"], &more[..]].concat());
+        assert!(code == 2 && err.contains(wanted) && !refused.exists(), "{more:?}: {code} {err}");
+    }
+    let (code, _, err) = render(&folder("refused"), &["--preset", "paper", "--set", "quality.solver=oracle"]);
+    assert!(code == 2 && err.contains("quality.solver: is rk2"), "{err}");
 }
 
 #[test]

@@ -128,7 +128,8 @@ impl IdealFrame {
 pub struct Settings {
     /// Whose methods.
     pub preset: Preset,
-    /// Temporal inverse; the paper's preset takes [`Solver::Rk2`] by default.
+    /// Temporal inverse; by default [`Solver::Reproject`]. The paper's preset takes [`Solver::Rk2`]; another one beside it
+    /// leaves its other methods as they are, which tells its causes of error apart.
     pub solver: Option<Solver>,
     /// Samples over the exposure; `None` chooses by the length of the path (100 in the paper's preset).
     pub blur_samples: Option<u32>,

@@ -18,7 +18,7 @@ pub use camera::{
     ZoomSpec,
 };
 pub use scene::{HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
-pub use validate::{Problem, validate, validate_camera};
+pub use validate::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera};
 
 /// Everything that one run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -189,11 +189,11 @@ pub struct QualitySpec {
     pub max_terrain_error_px: f64,
     /// Temporal solver.
     pub solver: Auto<Solver>,
-    /// Depth look-ups of `reproject`.
+    /// Depth look-ups of `reproject`, at most [`MAX_ITERATIONS`].
     pub iterations: Auto<u32>,
-    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure.
+    /// Exposure samples per pixel of path; with the paper preset, samples of the exposure. At most [`MAX_BLUR_SAMPLES`].
     pub blur_samples: Auto<u32>,
-    /// Footprint taps per axis of an output pixel.
+    /// Footprint taps per axis of an output pixel, at most [`MAX_FOOTPRINT_TAPS`].
     pub footprint_taps: Auto<u32>,
     /// Pixels of the ideal frame for each of the camera's, along a side.
     pub ideal_scale: Auto<f64>,

@@ -5,7 +5,7 @@
 //! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR
 //! depth = "depth.exr"                # EXR Z in metres, 16-bit PNG or PGM with depth_per_metre, or packed24
 //! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
-//! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers
+//! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers only: 0.001 to 1e6
 //! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
 //! principal_point_px = [543.5, 407.5]  # default: its centre
@@ -21,6 +21,11 @@
 //! ```
 //!
 //! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone.
+//! A picture of nothing but 0 and infinity may be sky; one of nothing but what no depth can be (negative, not a number, nearer than a
+//! micrometre) is refused: it is in another sign or unit.
+//!
+//! A twist is constant **in the camera's own axes**: a screw, whose velocity turns with the camera. With velocity v across rate w the
+//! camera flies a circle of radius |v|/|w|; a camera that turns on a straight flight needs a trajectory.
 
 use std::path::{Path, PathBuf};
 
@@ -186,7 +191,7 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
     let motion = read_motion(&spec.motion, path)?;
     let inverse_depth = match &spec.depth {
         Some(depth) => depth::read_inverse_depth(depth, &spec, &geometry, path)?,
-        None if translates(&motion) => {
+        None if motion.translates() => {
             return Err(fail(
                 "depth",
                 "is missing, and the camera moves: without depth nothing says by how much surfaces shift; add it, or leave only the rotation",
@@ -204,13 +209,6 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
     let without_depth = inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
     let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, instant_s: 1e-3 * spec.instant_ms };
     Ok(FrameFile { frame, motion, fog, without_depth })
-}
-
-fn translates(motion: &Motion) -> bool {
-    match motion {
-        Motion::Twist(twist) => twist.velocity_m_s != DVec3::ZERO,
-        Motion::Poses(_) => true,
-    }
 }
 
 /// A twist (nothing given is no motion) or a table of poses, not both.

@@ -69,7 +69,7 @@ pub fn parse_scenario(text: &str, path: &Path, sets: &[(String, String)]) -> Res
 /// # Errors
 /// As [`read_scenario`].
 pub fn read_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
-    let mut tree = Tree::read(path, "camera")?;
+    let mut tree = Tree::read_camera(path)?;
     let problems = check::check(&mut tree, &schema::SCENARIO, "camera");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems));
@@ -117,7 +117,7 @@ fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> 
     Err(ScenarioError::Problems(problems.iter().map(|problem| format!("{}: {problem}", tree.place(&problem.key))).collect()))
 }
 
-/// What the schema lets through and the struct does not (a number beyond its integer type) is named without a line.
+/// The schema lets nothing through that the struct does not take; should it, the file is named without a line.
 pub(crate) fn deserialize<T: serde::de::DeserializeOwned>(tree: &Tree) -> Result<T, ScenarioError> {
     let described = |error: toml::de::Error| ScenarioError::Problems(vec![format!("{}: {}", tree.file.display(), error.message())]);
     toml::Value::Table(tree.root.clone()).try_into().map_err(described)

@@ -63,18 +63,18 @@ pub enum WriteError {
         message: String,
     },
     /// The threads are gone without an error of their own.
-    #[error("the writer threads ended early; run again with --resume")]
+    #[error("the writer threads ended early; run again")]
     Ended,
 }
 
 fn advice(source: &io::Error) -> &'static str {
     match source.kind() {
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on the disk and run again with --resume",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on the disk and run again",
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => "choose a folder that you may write to, with -o",
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists | io::ErrorKind::IsADirectory => {
             "something else has that name; choose another folder with -o"
         }
-        _ => "check the path, then run again with --resume",
+        _ => "check the path, then run again",
     }
 }
 

@@ -58,12 +58,14 @@ pub enum BenchError {
     #[error(transparent)]
     Plot(#[from] PlotError),
     /// A name that no case has.
-    #[error("there is no case or group \"{name}\"; there are: {known}")]
+    #[error("there is no case or group \"{name}\"; cases are {cases}; groups are {groups}")]
     NoSuchCase {
         /// What was asked for.
         name: String,
-        /// What there is.
-        known: String,
+        /// The cases there are.
+        cases: String,
+        /// The groups there are.
+        groups: String,
     },
 }
 
@@ -186,8 +188,11 @@ fn minutes(seconds: f64) -> String {
 fn choose(all: Vec<Case>, options: &Options) -> Result<Vec<Case>, BenchError> {
     for name in &options.cases {
         if !all.iter().any(|case| case.name == name || case.group.name() == name) {
-            let known = all.iter().map(|case| case.name).collect::<Vec<_>>().join(", ");
-            return Err(BenchError::NoSuchCase { name: name.clone(), known });
+            let cases = all.iter().map(|case| case.name).collect::<Vec<_>>().join(", ");
+            let mut groups: Vec<&str> = all.iter().map(|case| case.group.name()).collect();
+            // Cases of a group stand together.
+            groups.dedup();
+            return Err(BenchError::NoSuchCase { name: name.clone(), cases, groups: groups.join(", ") });
         }
     }
     let named = |case: &Case| options.cases.iter().any(|name| case.name == name || case.group.name() == name);
@@ -301,13 +306,22 @@ mod tests {
 
     #[test]
     fn cases_are_chosen_by_name_and_by_group() {
+        let all = cases().expect("cases");
         let names = |list: &[&str], quick: bool| {
             let options = Options { cases: list.iter().map(|name| (*name).to_owned()).collect(), quick };
-            choose(cases().expect("cases"), &options).map(|cases| cases.iter().map(|case| case.name).collect::<Vec<_>>())
+            choose(all.clone(), &options).map(|cases| cases.iter().map(|case| case.name).collect::<Vec<_>>())
         };
         assert_eq!(names(&["lens-s3", "vibration"], false).expect("cases"), ["vibration-100", "vibration-200", "lens-s3"]);
         assert_eq!(names(&[], true).expect("cases"), QUICK);
         let unknown = names(&["lens-s4"], false).expect_err("no such case").to_string();
         assert!(unknown.contains("lens-s4") && unknown.contains("lens-s3"), "{unknown}");
+        let (_, groups) = unknown.split_once("groups are ").expect("groups");
+        assert!(groups.split(", ").all(|group| names(&[group], false).is_ok_and(|cases| !cases.is_empty())), "{groups}");
+        assert!(
+            ["smooth", "lenses", "vibration", "all effects"]
+                .iter()
+                .all(|name| groups.split(", ").filter(|group| group == name).count() == 1),
+            "{groups}"
+        );
     }
 }

@@ -160,6 +160,19 @@ pub enum ReproduceError {
     /// A plot.
     #[error(transparent)]
     Plot(#[from] PlotError),
+    /// Pictures in which nothing is found to measure.
+    #[error(
+        "no circle of the target was found in the pictures of {calibration}'s calibration, {width_px} px wide: circles of fewer than {least_px} \
+         dark pixels are not told from noise; take a larger width (the paper's is 640)"
+    )]
+    NoCircle {
+        /// Whose camera.
+        calibration: &'static str,
+        /// Width of the pictures.
+        width_px: u32,
+        /// Fewest pixels of a circle.
+        least_px: usize,
+    },
     /// A picture too small for what is measured on it, or a setting that makes no camera.
     #[error("{what} of the experiment cannot be used: {reason}; take a width of 96 to 4096 px")]
     Made {

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::anyhow;
 use camsim_gpu::{AdapterChoice, Engine};
 use camsim_lab::bench::{BenchError, Options, Report, Step, run as measure};
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
-    output::write_output,
+    output::{check_folder, check_output, write_output},
 };
 
 /// Measure run time against error on this machine: every case with every method
@@ -24,10 +24,11 @@ use crate::{
 Examples:
   camsim bench --quick                        four cases, small pictures
   camsim bench -o bench                       everything: bench.md, bench.json, bench.csv, bench.svg in ./bench
-  camsim bench --cases buildings,lens-s3      some cases or groups by name
+  camsim bench --cases buildings,lens-s3      some cases or groups by name; groups are smooth, vibration, buildings,
+                                              \"1 s windows\", exposure, lenses, \"all effects\"
   camsim bench --quick --check                exit code 1 if a row chosen by the plan is beaten in time and error")]
 pub struct Args {
-    /// Cases or groups, with commas; a name that does not exist lists them all
+    /// Cases or groups of them, with commas (in quotes where they have blanks: "1 s windows"); a name that does not exist lists them all
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     cases: Vec<String>,
     /// Few cases, pictures of 320x240, few rounds
@@ -53,11 +54,9 @@ pub struct Args {
 /// Measures and prints.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let options = Options { cases: args.cases.clone(), quick: args.quick };
+    check_files(args)?;
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("adapter: {}", engine.gpu().adapter));
-    if let Some(folder) = &args.output {
-        std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display())).or_failed()?;
-    }
     let report = measure(&engine, &options, &mut |step| match step {
         Step::Begins(what) => {
             console.note(what);
@@ -73,11 +72,20 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.note(report.summary());
     match report.violations.len() {
-        beaten if args.check && beaten > 0 => Err(Failure::failed(anyhow::anyhow!(
-            "{beaten} rows that the plan chose are beaten in both time and error; the table lists them"
-        ))),
+        beaten if args.check && beaten > 0 => {
+            Err(Failure::failed(anyhow!("{beaten} rows that the plan chose are beaten in both time and error; the table lists them")))
+        }
         _ => Ok(()),
     }
+}
+
+/// Ten minutes of work are not for a file that cannot be written.
+fn check_files(args: &Args) -> Result<(), Failure> {
+    if let Some(plot) = args.plot.as_ref().filter(|plot| !plot.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"))) {
+        return Err(Failure::bad_input(anyhow!("--plot {}: the plot is SVG: the name must end in .svg", plot.display())));
+    }
+    args.output.iter().try_for_each(|folder| check_folder(folder))?;
+    [&args.csv, &args.plot].into_iter().flatten().try_for_each(|path| check_output(path))
 }
 
 /// Every file that was asked for, each whole.

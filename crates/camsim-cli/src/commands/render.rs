@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_core::scenario::{Auto, Channel, ImageFormat, Scenario, Solver};
+use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Scenario, Solver, validate};
 use camsim_gpu::{AdapterChoice, Engine};
 use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::{
     console::Console,
-    failure::{Failure, OrFail},
+    failure::{FAILED, Failure, OrFail},
     frame_list::{FrameList, Shard},
     frame_source::{Device, FrameSource, Rays},
     inputs::{self, Changes, ScenarioArgs},
@@ -68,7 +68,8 @@ pub struct Args {
 enum Backend {
     /// The engine on wgpu, also on a software adapter
     Gpu,
-    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as quality.solver = "oracle"
+    /// The slow exact renderer: every sample of every pixel a ray of its own, in f64 on the CPU; the same as quality.solver = "oracle", so
+    /// no other solver goes with it, nor the paper's preset
     Reference,
 }
 
@@ -121,7 +122,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         Box::new(Device::new(&engine, &loaded.sequence)?)
     };
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let outcome = render_run::run(&job, &mut *source, console, &mut |_| {})?;
+    let outcome = render_run::run(&job, &mut *source, console, &mut |_| {}).inspect_err(|failure| {
+        if failure.code() == FAILED && folder.join("run.json").is_file() {
+            console.note("frames that are written stay as they are: --resume goes on with the others");
+        }
+    })?;
     if !console.is_quiet() {
         let kept = if outcome.skipped > 0 { format!(" ({} were there already)", outcome.skipped) } else { String::new() };
         let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
@@ -141,8 +146,26 @@ fn default_folder(scenario: &Path) -> PathBuf {
 /// `--backend reference` is written into the scenario, so that frames of the two backends never mix in one folder.
 fn with_backend(mut scenario: Scenario, backend: Option<Backend>) -> Result<Scenario, Failure> {
     let oracle = Auto::Value(Solver::Oracle);
+    let refused = |what: &str| {
+        Err(Failure::bad_input(anyhow!(
+            "{what} does not go with --backend reference, which casts exact rays whatever the methods: leave --backend out, or use the default \
+             preset and solver (--preset default --set quality.solver=auto)"
+        )))
+    };
     match backend {
-        Some(Backend::Reference) => scenario.quality.solver = oracle,
+        Some(Backend::Reference) if scenario.quality.preset == Preset::Paper => return refused("quality.preset = \"paper\""),
+        Some(Backend::Reference) => {
+            match scenario.quality.solver {
+                Auto::Auto | Auto::Value(Solver::Oracle) => scenario.quality.solver = oracle,
+                Auto::Value(Solver::Linear) => return refused("quality.solver = \"linear\""),
+                Auto::Value(Solver::Rk2) => return refused("quality.solver = \"rk2\""),
+                Auto::Value(Solver::Reproject) => return refused("quality.solver = \"reproject\""),
+            }
+            // Keys that go with `auto` and not with the oracle.
+            if let Some(problem) = validate(&scenario).first() {
+                return Err(Failure::bad_input(anyhow!("{problem} (--backend reference is quality.solver = \"oracle\")")));
+            }
+        }
         Some(Backend::Gpu) if scenario.quality.solver == oracle => {
             return Err(Failure::bad_input(anyhow!(
                 "quality.solver is \"oracle\", which --backend gpu does not have: leave --backend out, or change the solver (--set quality.solver=auto)"

@@ -1,12 +1,16 @@
 //! `camsim reproduce`: the experiments of the paper.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
 use camsim_gpu::{AdapterChoice, Engine};
 use camsim_lab::reproduce::{Experiment, ReproduceError, Setup};
 
-use crate::{console::Console, failure::Failure};
+use crate::{
+    console::Console,
+    failure::{BAD_INPUT, Failure},
+    output::check_folder,
+};
 
 /// Names the folder of the paper's inputs where `--data` does not.
 const DATA_VARIABLE: &str = "CAMSIM_DATA";
@@ -47,7 +51,7 @@ pub struct Args {
     /// Folder of the paper's inputs: camsim/path_lawnmower.csv, camsim/path-chessboard-*.csv, flights/, terrain/
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Width of the pictures, 4 to 3; the paper's are 640 px wide
+    /// Width of the pictures, 4 to 3, 96 to 4096 px; the paper's are 640 px wide. In those of 128 px and less lens finds no circle
     #[arg(long, value_name = "PX", default_value_t = 640)]
     width: u32,
 }
@@ -87,9 +91,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Err(Failure::bad_input(anyhow!("--width {}: must be {least} to {most} pixels", args.width)));
     }
     let data = data_folder(args)?;
+    check_folder(&args.output)?;
     // In the paper's order, whatever the order of the words.
     let asked: Vec<Experiment> = args.experiments.iter().map(|which| which.experiment()).collect();
-    let chosen = Experiment::ALL.into_iter().filter(|experiment| asked.is_empty() || asked.contains(experiment));
+    let chosen: Vec<Experiment> = Experiment::ALL.into_iter().filter(|experiment| asked.is_empty() || asked.contains(experiment)).collect();
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
     if data.is_none() {
@@ -99,22 +104,41 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     let scratch = args.output.join("inputs");
     let setup = Setup { engine: &engine, data: data.as_deref(), scratch: &scratch, width_px: args.width };
-    for experiment in chosen {
+    // What one experiment lacks is no reason to leave out the others.
+    let mut failures = Vec::new();
+    for experiment in &chosen {
         console.note(format_args!("{} ...", experiment.name()));
-        let report = experiment.run(&setup).map_err(of_reproduction)?;
-        let folder = args.output.join(experiment.name());
-        report.write(&folder, experiment.title()).map_err(of_reproduction)?;
-        console.line(experiment.title())?;
-        for note in &report.notes {
-            console.line(format_args!("  {note}"))?;
+        match one(*experiment, &setup, &args.output, console) {
+            Err(failure) if failure.is_broken_pipe() => return Err(failure),
+            Err(failure) => {
+                console.complain(&format!("{}: {failure}\n", experiment.name()));
+                failures.push((experiment.name(), failure.code()));
+            }
+            Ok(()) => {}
         }
-        for (_, table) in &report.tables {
-            console.line(format_args!("\n{}", table.text().trim_end()))?;
-        }
-        console.line(format_args!("\n  all of it: {}\n", folder.join("report.md").display()))?;
-        console.flush()?;
     }
-    Ok(())
+    if failures.is_empty() {
+        return Ok(());
+    }
+    let names = failures.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    let error = anyhow!("{} of {} experiments were not done: {names}; the reasons stand above", failures.len(), chosen.len());
+    Err(if failures.iter().all(|(_, code)| *code == BAD_INPUT) { Failure::bad_input(error) } else { Failure::failed(error) })
+}
+
+/// Does one experiment, writes its folder and prints its tables.
+fn one(experiment: Experiment, setup: &Setup<'_>, output: &Path, console: &mut Console<'_>) -> Result<(), Failure> {
+    let report = experiment.run(setup).map_err(of_reproduction)?;
+    let folder = output.join(experiment.name());
+    report.write(&folder, experiment.title()).map_err(of_reproduction)?;
+    console.line(experiment.title())?;
+    for note in &report.notes {
+        console.line(format_args!("  {note}"))?;
+    }
+    for (_, table) in &report.tables {
+        console.line(format_args!("\n{}", table.text().trim_end()))?;
+    }
+    console.line(format_args!("\n  all of it: {}\n", folder.join("report.md").display()))?;
+    Ok(console.flush()?)
 }
 
 /// The folder named by the command line or the environment; it must be there.
@@ -139,7 +163,7 @@ fn of_reproduction(error: ReproduceError) -> Failure {
     match error {
         ReproduceError::Gpu(error) => error.into(),
         ReproduceError::Render(error) => error.into(),
-        ReproduceError::Write(_) | ReproduceError::Plot(_) => Failure::failed(error),
+        ReproduceError::Write(_) | ReproduceError::Plot(_) | ReproduceError::NoCircle { .. } => Failure::failed(error),
         _ => Failure::bad_input(error),
     }
 }

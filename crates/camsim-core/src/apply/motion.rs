@@ -49,6 +49,15 @@ impl Motion {
         }
     }
 
+    /// Whether the camera may change its place, so that depth matters; of a table that is taken for granted.
+    #[must_use]
+    pub fn translates(&self) -> bool {
+        match self {
+            Self::Twist(twist) => twist.velocity_m_s != DVec3::ZERO,
+            Self::Poses(_) => true,
+        }
+    }
+
     /// Whether a window is covered.
     ///
     /// # Errors

@@ -4,7 +4,7 @@
 //! | step | here | camsim's own |
 //! |---|---|---|
 //! | depth | nearest texel where the ray would look if nothing moved | bilinear where the ray does look |
-//! | displacement | Heun's steps of at most 2.5 deg, constant twist and depth (`solver = "linear"` gives eq. 16) | exact relative pose |
+//! | displacement | Heun's steps of at most 2.5 deg, constant twist and depth (another solver can be set beside it here, to tell causes apart) | exact relative pose |
 //! | exposure | `blur_samples` samples, both ends included, on the straight segment between the two ends (eq. 20) | midpoints on the curved path |
 //! | averages | of stored (sRGB-encoded) values | of light |
 //! | pixel area | one bilinear sample | footprint taps |

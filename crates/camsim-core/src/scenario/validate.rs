@@ -5,6 +5,13 @@ use std::fmt;
 use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Solver, TrackerSpec};
 use crate::plan::MAX_KEYS;
 
+/// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
+pub const MAX_ITERATIONS: u32 = 64;
+/// Most samples for a pixel of path, or for an exposure in the paper's preset. Two a pixel keep white texture below 1/255 (NUMERICS section 3).
+pub const MAX_BLUR_SAMPLES: u32 = 4096;
+/// Most reads along a side of a pixel; the planner takes 4 at most.
+pub const MAX_FOOTPRINT_TAPS: u32 = 64;
+
 /// One value that no run can use.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
@@ -66,8 +73,10 @@ impl Check {
         self.require(values.iter().all(|value| value.is_finite()), key, || format!("must be finite, not {values:?}"));
     }
 
-    fn at_least_one(&mut self, key: &str, value: Auto<u32>) {
-        self.require(value.value() != Some(0), key, || "must be at least 1; leave it out or write \"auto\" to have it chosen".into());
+    fn count(&mut self, key: &str, value: Auto<u32>, most: u32) {
+        self.require(value.value().is_none_or(|count| (1..=most).contains(&count)), key, || {
+            format!("must be 1 to {most}; leave it out or write \"auto\" to have it chosen")
+        });
     }
 }
 
@@ -103,7 +112,7 @@ fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
 }
 
 /// Larger pictures than this are typing errors on every adapter there is.
-const MAX_SIDE_PX: u32 = 65_536;
+pub const MAX_SIDE_PX: u32 = 65_536;
 
 fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.require(camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)), "camera.size_px", || {
@@ -207,14 +216,14 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.positive("quality.max_error_px", quality.max_error_px, "0.05 is the default");
     check.positive("quality.max_error_dn", quality.max_error_dn, "1 is the default");
     check.positive("quality.max_terrain_error_px", quality.max_terrain_error_px, "0.25 is the default");
-    check.at_least_one("quality.iterations", quality.iterations);
+    check.count("quality.iterations", quality.iterations, MAX_ITERATIONS);
     check.require(
         quality.iterations == Auto::Auto || !matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Rk2 | Solver::Oracle)),
         "quality.iterations",
         || "counts the depth look-ups of \"reproject\"; leave it out with any other quality.solver".into(),
     );
-    check.at_least_one("quality.blur_samples", quality.blur_samples);
-    check.at_least_one("quality.footprint_taps", quality.footprint_taps);
+    check.count("quality.blur_samples", quality.blur_samples, MAX_BLUR_SAMPLES);
+    check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
     check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=4.0).contains(&scale)), "quality.ideal_scale", || {
         "must be 1 to 4 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
     });
@@ -234,7 +243,7 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     check.require(camera.lens.model != LensModel::KannalaBrandt && !rational, "quality.preset", || {
         "\"paper\" knows pinhole and brown-conrady lenses with k1 k2 p1 p2 k3 only; write \"default\"".into()
     });
-    check.require(!matches!(quality.solver, Auto::Value(Solver::Linear | Solver::Reproject)), "quality.solver", || {
+    check.require(matches!(quality.solver, Auto::Auto | Auto::Value(Solver::Rk2)), "quality.solver", || {
         "is rk2 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
     check.require(quality.iterations == Auto::Auto, "quality.iterations", || {
@@ -343,6 +352,10 @@ mod tests {
                 s.quality.preset = Preset::Paper;
                 s.quality.solver = Auto::Value(Solver::Linear);
             }),
+            ("quality.solver", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.solver = Auto::Value(Solver::Oracle);
+            }),
             ("quality.iterations", |s| {
                 s.quality.preset = Preset::Paper;
                 s.quality.iterations = Auto::Value(2);
@@ -353,6 +366,9 @@ mod tests {
             }),
             ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
+            ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(MAX_BLUR_SAMPLES + 1)),
+            ("quality.footprint_taps", |s| s.quality.footprint_taps = Auto::Value(MAX_FOOTPRINT_TAPS + 1)),
+            ("quality.iterations", |s| s.quality.iterations = Auto::Value(MAX_ITERATIONS + 1)),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(0.5)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),
             ("quality.iterations", |s| {

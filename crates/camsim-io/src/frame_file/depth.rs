@@ -13,6 +13,10 @@ use super::{
 
 /// Depth of the reference program's cleared buffer, metres: all three bytes full.
 const PACKED24_SKY_M: f64 = 65_281.0;
+/// Stored values of one metre that 16 bits make sense of: steps from a kilometre to a micrometre.
+const PER_METRE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
+/// No camera sees anything nearer, metres. Its inverse and the slant of any ray fit an f32.
+const NEAREST_M: f64 = 1e-6;
 
 /// 1/z in 1/m, 0 where there is no depth.
 pub(super) fn read_inverse_depth(
@@ -22,20 +26,30 @@ pub(super) fn read_inverse_depth(
     frame_path: &Path,
 ) -> Result<Vec<f32>, FrameFileError> {
     let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
+    let packed = spec.depth_encoding == DepthEncoding::Packed24;
     let (size_px, values, whole) = if is_exr(path) {
+        if packed {
+            return Err(fail(
+                "depth_encoding",
+                "\"packed24\" is of 8-bit RGB pictures, and depth is an EXR, whose Z is in metres; leave it out",
+            ));
+        }
         let (size_px, values) = read_exr_depth(path)?;
         (size_px, values, false)
     } else {
         let picture = open(path)?;
         let size_px = [picture.width(), picture.height()];
-        match spec.depth_encoding {
-            DepthEncoding::Packed24 => (size_px, packed24(&picture), false),
-            DepthEncoding::Plain => (size_px, whole_numbers(&picture, path)?, true),
-        }
+        if packed { (size_px, packed24(&picture, path)?, false) } else { (size_px, whole_numbers(&picture, path)?, true) }
     };
     let per_metre = match (spec.depth_per_metre, whole) {
-        (Some(per_metre), _) if per_metre.is_finite() && per_metre > 0.0 => per_metre,
-        (Some(_), _) => return Err(fail("depth_per_metre", "must be a finite number above 0: the stored value of one metre")),
+        (Some(per_metre), true) if PER_METRE.contains(&per_metre) => per_metre,
+        (Some(_), true) => {
+            let message = "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM";
+            return Err(fail("depth_per_metre", message));
+        }
+        (Some(_), false) => {
+            return Err(fail("depth_per_metre", "is for 16-bit PNG and PGM; EXR and packed24 are in metres: leave it out"));
+        }
         (None, false) => 1.0,
         (None, true) => {
             return Err(fail(
@@ -51,6 +65,7 @@ pub(super) fn read_inverse_depth(
             format!("is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place", size_px[0], size_px[1]),
         ));
     }
+    refuse_without_any(&values, per_metre, path)?;
     let planar = |(i, value): (usize, f64)| {
         let depth_m = value / per_metre;
         let pixel = DVec2::new((i as u32 % size_px[0]).into(), (i as u32 / size_px[0]).into());
@@ -59,10 +74,34 @@ pub(super) fn read_inverse_depth(
             DepthKind::Range => ((pixel - geometry.principal_px) / geometry.focal_px).extend(1.0).length(),
         };
         let inverse = slant / depth_m;
-        // Nothing is nearer than a micrometre; what claims to be is no measurement either.
-        if depth_m.is_finite() && depth_m > 1e-6 { inverse as f32 } else { 0.0 }
+        if usable(depth_m) { inverse as f32 } else { 0.0 }
     };
     Ok(values.into_iter().enumerate().map(planar).collect())
+}
+
+/// Nothing is nearer than [`NEAREST_M`]; what claims to be is no measurement either.
+fn usable(depth_m: f64) -> bool {
+    depth_m.is_finite() && depth_m > NEAREST_M
+}
+
+/// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is in another sign or unit.
+fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(), FrameFileError> {
+    if values.iter().any(|value| usable(value / per_metre)) {
+        return Ok(());
+    }
+    let count = |what: &dyn Fn(f64) -> bool| values.iter().filter(|value| what(**value)).count();
+    let (negative, nan, near) = (count(&|z| z < 0.0), count(&f64::is_nan), count(&|z| z > 0.0 && z.is_finite()));
+    if negative + nan + near == 0 {
+        return Ok(());
+    }
+    let all = values.len();
+    Err(failure(
+        path,
+        format!(
+            "has no depth: of {all} pixels {negative} are negative, {nan} not a number, {near} nearer than a micrometre; depth is in metres and \
+             positive forward (OpenGL's z is the negative of it), 0 where it is unknown"
+        ),
+    ))
 }
 
 /// The channel `Z`, under any layer name, or the only channel.
@@ -85,8 +124,12 @@ fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameF
 }
 
 /// Decoded texel by texel: packed bytes must never be filtered.
-fn packed24(picture: &DynamicImage) -> Vec<f64> {
+fn packed24(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
+    if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
+        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" is for; leave that key out for 16-bit grey";
+        return Err(failure(path, message));
+    }
     let depth_m = |[r, g, b]: [u8; 3]| f64::from(r) * 255.0 + f64::from(g) + f64::from(b) / 255.0;
     let metres = picture.to_rgb8().pixels().map(|pixel| depth_m(pixel.0)).collect::<Vec<_>>();
-    metres.into_iter().map(|z| if z >= PACKED24_SKY_M { 0.0 } else { z }).collect()
+    Ok(metres.into_iter().map(|z| if z >= PACKED24_SKY_M { 0.0 } else { z }).collect())
 }

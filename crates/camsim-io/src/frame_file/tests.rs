@@ -84,6 +84,45 @@ fn depth_is_read_from_exr_and_packed_bytes() {
 }
 
 #[test]
+fn depth_that_means_nothing_is_refused_and_sky_is_not() {
+    let (folder, path) = folder("color = \"c.png\"\ndepth = \"z.exr\"\nfocal_px = [2, 2]\n");
+    let read_depth = |depth_m: [f32; 6]| {
+        let frame =
+            RenderedFrame { size_px: [3, 2], color_rgba: vec![0.5; 24], depth_m: Some(depth_m.to_vec()), ..RenderedFrame::default() };
+        write_picture(&folder.path().join("z.exr"), &frame, OutputEncoding::Srgb8).unwrap();
+        read_frame(&path)
+    };
+    for (depth_m, expected) in [
+        ([-5.0; 6], "z.exr: has no depth: of 6 pixels 6 are negative"),
+        ([f32::NAN; 6], "6 not a number"),
+        ([1e-9; 6], "6 nearer than a micrometre"),
+        ([-5.0, -4.0, f32::NEG_INFINITY, 0.0, 0.0, f32::INFINITY], "3 are negative, 0 not a number, 0 nearer"),
+    ] {
+        let error = read_depth(depth_m).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("OpenGL"), "{error}");
+    }
+    for sky in [[0.0; 6], [f32::INFINITY; 6]] {
+        assert_eq!(read_depth(sky).unwrap().without_depth, 1.0);
+    }
+    assert_eq!(read_depth([-1.0, -1.0, -1.0, f32::NAN, 0.0, 4.0]).unwrap().frame.inverse_depth, [0.0, 0.0, 0.0, 0.0, 0.0, 0.25]);
+
+    let of_exr = "color = \"c.png\"\ndepth = \"z.exr\"\nfocal_px = [2, 2]\n";
+    for (text, expected) in [
+        (format!("{of_exr}depth_encoding = \"packed24\"\n"), "FRAME.toml: depth_encoding: \"packed24\" is of 8-bit RGB pictures"),
+        (format!("{of_exr}depth_per_metre = 1000\n"), "depth_per_metre: is for 16-bit PNG and PGM"),
+        (GOOD.replace("1000", "1e-300"), "depth_per_metre: must be 0.001 to 1e6"),
+        (GOOD.replace("1000", "1e300"), "depth_per_metre: must be 0.001 to 1e6"),
+        (GOOD.replace("1000", "nan"), "depth_per_metre: must be 0.001 to 1e6"),
+        (GOOD.replace("depth_per_metre = 1000", "depth_encoding = \"packed24\""), "d.png: is no 8-bit RGB picture"),
+        (format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"), "depth_per_metre: is for 16-bit PNG and PGM"),
+    ] {
+        fs::write(&path, &text).unwrap();
+        let error = read_frame(&path).unwrap_err().to_string();
+        assert!(error.contains(expected), "{text}\n  gives {error}\n  not   {expected}");
+    }
+}
+
+#[test]
 fn bad_frames_are_named_by_key_and_file() {
     for (text, expected) in [
         ("color = \"c.png\"\n", "focal_px: is missing"),

@@ -13,11 +13,17 @@ pub(crate) fn check(tree: &mut Tree, schema: &Schema, prefix: &str) -> Vec<Strin
     let mut root = std::mem::take(&mut tree.root);
     check_table(tree, schema, &mut root, prefix, prefix, &mut problems);
     tree.root = root;
-    problems
+    // In a camera file of its own the keys stand at the root.
+    let inner = if prefix.is_empty() { String::new() } else { format!("{prefix}.") };
+    let line = |(at, message): &(String, String)| {
+        let message = message.replace(&format!("`{inner}"), "`").replace(&format!("[[{inner}"), "[[");
+        format!("{}: {}: {message}", tree.place(at), at.strip_prefix(&inner).unwrap_or(at))
+    };
+    problems.iter().map(line).collect()
 }
 
-/// `at` is the key with indices (its place), `key` the one without (the schema's).
-fn check_table(tree: &Tree, schema: &Schema, table: &mut Table, at: &str, key: &str, problems: &mut Vec<String>) {
+/// `at` is the key with indices (its place), `key` the one without (the schema's). Problems are pairs of place and message.
+fn check_table(tree: &Tree, schema: &Schema, table: &mut Table, at: &str, key: &str, problems: &mut Vec<(String, String)>) {
     for (name, value) in table.iter_mut() {
         let (at, key) = (join(at, name), join(key, name));
         let wrong = match (schema.kind_of(&key), value) {
@@ -44,13 +50,13 @@ fn check_table(tree: &Tree, schema: &Schema, table: &mut Table, at: &str, key: &
                 None => format!("unknown key; {}", schema.listing),
             }),
         };
-        problems.extend(wrong.map(|message| format!("{}: {at}: {message}", tree.place(&at))));
+        problems.extend(wrong.map(|message| (at, message)));
     }
     for (required, within) in schema.required {
         let missing = *within == key;
         let path = required.strip_prefix(within).unwrap_or(required).trim_start_matches('.');
         if missing && !has(table, path) {
-            problems.push(format!("{}: {}: is missing, and has no default; add it", tree.place(at), join(at, path)));
+            problems.push((join(at, path), "is missing, and has no default; add it".into()));
         }
     }
 }
@@ -65,6 +71,7 @@ fn has(table: &Table, path: &str) -> bool {
 fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<String> {
     let number = |value: &Value| value.is_float() || value.is_integer();
     let whole = |value: &Value| value.as_integer().is_some_and(|value| value >= 0);
+    let count = |value: &Value| value.as_integer().is_some_and(|value| u32::try_from(value).is_ok());
     let all = |value: &Value, count: Option<usize>, test: &dyn Fn(&Value) -> bool| {
         value.as_array().is_some_and(|array| count.is_none_or(|count| array.len() == count) && array.iter().all(test))
     };
@@ -73,10 +80,13 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         Kind::Number => (number(value), "a number".to_owned()),
         Kind::NumberOr(words) => (number(value) || among(value, words), format!("a number or {}", list(words))),
         Kind::Whole => (whole(value), "a whole number, 0 or more".to_owned()),
-        Kind::WholeOr(words) => (whole(value) || among(value, words), format!("a whole number or {}", list(words))),
+        Kind::UpTo(most) => {
+            (value.as_integer().is_some_and(|v| (0..=i64::from(most)).contains(&v)), format!("a whole number, 0 to {most}"))
+        }
+        Kind::CountOr(most, words) => (count(value) || among(value, words), format!("a whole number up to {most} or {}", list(words))),
         Kind::Numbers(n) => (all(value, Some(n), &number), format!("a list of {n} numbers")),
         Kind::NumbersOr(n, word) => (all(value, Some(n), &number) || among(value, &[word]), format!("a list of {n} numbers or \"{word}\"")),
-        Kind::Wholes(n) => (all(value, Some(n), &whole), format!("a list of {n} whole numbers")),
+        Kind::Counts(n, most) => (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {most}")),
         Kind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
         Kind::Path => (false, "a path in quotes".to_owned()),
         Kind::Tables => (false, format!("a list of tables; write [[{key}]]")),
@@ -92,7 +102,7 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         return Some(format!("\"{word}\" is not supported by this version; expected {text}"));
     }
     let hint = match kind {
-        Kind::Word(words) | Kind::Words(words) | Kind::NumberOr(words) | Kind::WholeOr(words) => {
+        Kind::Word(words) | Kind::Words(words) | Kind::NumberOr(words) | Kind::CountOr(_, words) => {
             written.iter().find(|word| !words.contains(word)).and_then(|word| schema::nearest_word(word, words))
         }
         _ => None,

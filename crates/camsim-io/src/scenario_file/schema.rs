@@ -1,5 +1,10 @@
 //! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml has a table of its own.
 
+use camsim_core::{
+    plan::MAX_KEYS,
+    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, MAX_SIDE_PX},
+};
+
 /// A table of keys with what belongs to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Schema {
@@ -24,16 +29,18 @@ pub(crate) enum Kind {
     Number,
     /// A number, or one of these words.
     NumberOr(&'static [&'static str]),
-    /// A whole number from 0.
+    /// A whole number from 0, beyond 32 bits too.
     Whole,
-    /// A whole number, or one of these words.
-    WholeOr(&'static [&'static str]),
+    /// A whole number from 0 to this one.
+    UpTo(u32),
+    /// A whole number of at most 32 bits, or one of these words. The message names the most that makes sense; ranges are checked later.
+    CountOr(u32, &'static [&'static str]),
     /// That many numbers.
     Numbers(usize),
     /// That many numbers, or this word.
     NumbersOr(usize, &'static str),
-    /// That many whole numbers.
-    Wholes(usize),
+    /// That many whole numbers of at most 32 bits; with the most that makes sense, as above.
+    Counts(usize, u32),
     /// Any number of numbers.
     NumberList,
     /// A path, resolved against the folder of the file that names it.
@@ -70,7 +77,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("tracker.max_acceleration_m_s2", Number),
     ("tracker.max_angular_rate_deg_s", NumberOr(AUTO)),
     ("tracker.max_angular_acceleration_deg_s2", Number),
-    ("camera.size_px", Wholes(2)),
+    ("camera.size_px", Counts(2, MAX_SIDE_PX)),
     ("camera.focal_px", Numbers(2)),
     ("camera.principal_point_px", Numbers(2)),
     ("camera.fps", Number),
@@ -106,7 +113,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("scene.terrain.dem", Path),
     ("scene.terrain.ortho", Path),
     ("scene.terrain.height", Word(HEIGHT)),
-    ("scene.terrain.epsg", Whole),
+    ("scene.terrain.epsg", UpTo(u16::MAX as u32)),
     ("scene.pattern.image", Path),
     ("scene.pattern.width_m", Number),
     ("scene.pattern.at", NumbersOr(3, "origin")),
@@ -118,11 +125,11 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.max_error_dn", Number),
     ("quality.max_terrain_error_px", Number),
     ("quality.solver", Word(&["auto", "linear", "rk2", "reproject", "oracle"])),
-    ("quality.iterations", WholeOr(AUTO)),
-    ("quality.blur_samples", WholeOr(AUTO)),
-    ("quality.footprint_taps", WholeOr(AUTO)),
+    ("quality.iterations", CountOr(MAX_ITERATIONS, AUTO)),
+    ("quality.blur_samples", CountOr(MAX_BLUR_SAMPLES, AUTO)),
+    ("quality.footprint_taps", CountOr(MAX_FOOTPRINT_TAPS, AUTO)),
     ("quality.ideal_scale", NumberOr(AUTO)),
-    ("quality.key_frames", WholeOr(AUTO)),
+    ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),
     ("output.exr_pixel", Word(&["half", "float"])),

@@ -34,7 +34,7 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
             continue;
         }
         let values: Vec<String> = match kind {
-            schema::Kind::Word(words) | schema::Kind::NumberOr(words) | schema::Kind::WholeOr(words) => {
+            schema::Kind::Word(words) | schema::Kind::NumberOr(words) | schema::Kind::CountOr(_, words) => {
                 words.iter().map(|w| (*w).into()).collect()
             }
             schema::Kind::Words(words) => words.iter().map(|w| format!("[\"{w}\"]")).collect(),
@@ -92,8 +92,16 @@ fn bad_scenarios_are_named_by_file_line_and_key() {
         ("[camera]\nreadout_ms = 3", "did you mean `camera.shutter.readout_ms`?"),
         ("qqqq = 1", "unknown key; `camsim render --print-default`"),
         ("[camera]\nfps = \"thirty\"", "dir/s.toml:7: camera.fps: expected a number, found \"thirty\""),
-        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers, found [640, -1]"),
-        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml"),
+        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers up to 65536, found [640, -1]"),
+        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml:7: camera.size_px: expected a list of 2 whole numbers up to 65536, found"),
+        (
+            "[quality]\nblur_samples = 4294967296",
+            "dir/s.toml:7: quality.blur_samples: expected a whole number up to 4096 or \"auto\", found 4294967296",
+        ),
+        ("[quality]\niterations = 4294967296", "dir/s.toml:7: quality.iterations: expected a whole number up to 64 or \"auto\""),
+        ("[quality]\nkey_frames = 4294967296", "dir/s.toml:7: quality.key_frames: expected a whole number up to 4 or \"auto\""),
+        ("[quality]\nfootprint_taps = 4294967295", "dir/s.toml:7: quality.footprint_taps: must be 1 to 64"),
+        ("[scene.terrain]\ndem = \"d.tif\"\nepsg = 65536", "dir/s.toml:8: scene.terrain.epsg: expected a whole number, 0 to 65535"),
         ("[camera.shutter]\nreadout = \"top-to-botom\"", "did you mean \"top-to-bottom\"?"),
         ("[camera.shutter]\ninterlace_ms = \"feild\"", "expected a number or \"field\", found \"feild\"; did you mean \"field\"?"),
         ("[camera]\nlens = 3", "camera.lens: expected a table, found 3"),
@@ -169,4 +177,16 @@ fn a_camera_file_is_read_with_its_own_paths_and_lines() {
     std::fs::write(&camera, "fps = 25\nfocal = 3\n").unwrap();
     let error = read_scenario(&file, &[], None).unwrap_err().to_string();
     assert!(error.contains("c.toml:2: camera.focal: unknown key; did you mean `camera.focal_px`?"), "{error}");
+    // By itself its keys have no table around them.
+    let error = read_camera(&camera).unwrap_err().to_string();
+    assert!(error.ends_with("c.toml:2: focal: unknown key; did you mean `focal_px`?"), "{error}");
+    for (text, expected) in [
+        ("[camera]\nfps = 25\n", "c.toml:1: camera: a CAMERA.toml has the keys of [camera] at its root: write fps = 30"),
+        ("fps = 1\nseed = 1\n[flight]\nlog = \"a.csv\"\n", "c.toml:2: seed: a CAMERA.toml has the keys of [camera] at its root: the rest"),
+    ] {
+        std::fs::write(&camera, text).unwrap();
+        for error in [read_camera(&camera).unwrap_err(), read_scenario(&file, &[], None).unwrap_err()] {
+            assert!(error.to_string().contains(expected), "{error}");
+        }
+    }
 }

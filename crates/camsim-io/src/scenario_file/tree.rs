@@ -11,7 +11,7 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::ScenarioError;
+use super::{ScenarioError, schema::KEYS};
 
 /// Where a key was written.
 #[derive(Clone, Debug)]
@@ -43,6 +43,24 @@ impl Tree {
     pub(crate) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
         let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
         Self::parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path, prefix)
+    }
+
+    /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its header, is refused as a whole.
+    pub(crate) fn read_camera(path: &Path) -> Result<Self, ScenarioError> {
+        let tree = Self::read(path, "camera")?;
+        let mut of_scenario = KEYS.iter().filter_map(|(key, _)| key.split('.').next());
+        match of_scenario.find(|name| tree.root.contains_key(*name)) {
+            None => Ok(tree),
+            Some(name) => {
+                let fix = if name == "camera" {
+                    "write fps = 30 and [lens], not [camera] and [camera.lens]"
+                } else {
+                    "the rest belongs into a scenario"
+                };
+                let place = tree.place(&join("camera", name));
+                Err(ScenarioError::Problems(vec![format!("{place}: {name}: a CAMERA.toml has the keys of [camera] at its root: {fix}")]))
+            }
+        }
     }
 
     pub(crate) fn parse(text: &str, path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
@@ -80,7 +98,7 @@ impl Tree {
     pub(super) fn resolve_camera(&mut self) -> Result<(), ScenarioError> {
         let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
         let path = self.resolve("camera", name);
-        let camera = Self::read(&path, "camera")?;
+        let camera = Self::read_camera(&path)?;
         self.root.insert("camera".into(), Value::Table(camera.root));
         self.places.insert("camera".into(), Place::File(path, 1));
         self.places.extend(camera.places);

@@ -1,6 +1,6 @@
 //! Finding dark circles in a picture, as somebody without the truth must.
 
-use camsim_core::frame::RenderedFrame;
+use camsim_core::{frame::RenderedFrame, reference::ErrorStats};
 use glam::DVec2;
 
 use super::pattern::Seen;
@@ -10,7 +10,7 @@ const THRESHOLD: f32 = 0.5;
 /// Pixels around what lies below the threshold that still belong to the circle: they carry its antialiased rim.
 const RIM_PX: i32 = 2;
 /// Smallest area of a circle that counts, pixels.
-const LEAST_PX: usize = 12;
+pub const LEAST_PX: usize = 12;
 
 /// A dark spot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,6 +113,15 @@ pub fn matches(seen: &[Seen], spots: &[Spot]) -> Matches {
 }
 
 impl Matches {
+    /// Statistics of [`Matches::errors_px`]; not a number where nothing was found, which is not an error of 0.
+    #[must_use]
+    pub fn stats(&self) -> ErrorStats {
+        match self.pairs.is_empty() {
+            true => ErrorStats { count: 0, rms_px: f64::NAN, p99_px: f64::NAN, max_px: f64::NAN },
+            false => ErrorStats::of(self.errors_px()),
+        }
+    }
+
     /// Distance of each spot from its circle's true centroid, pixels.
     #[must_use]
     pub fn errors_px(&self) -> Vec<f64> {
@@ -165,5 +174,7 @@ mod tests {
         let matches = matches(&[seen(10.0), seen(40.0), seen(80.0)], &[spot(10.5, 95.0), spot(44.0, 100.0), spot(80.1, 30.0)]);
         assert_eq!((matches.pairs.len(), matches.missed), (1, 2));
         assert_eq!(matches.errors_px(), [0.5]);
+        assert_eq!(matches.stats().rms_px, 0.5);
+        assert!(Matches::default().stats().rms_px.is_nan(), "nothing found is no error of 0");
     }
 }

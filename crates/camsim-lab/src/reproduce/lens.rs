@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::{
     Picture, Report, ReproduceError, Setup, Table,
-    circles::{matches, spots},
+    circles::{LEAST_PX, matches, spots},
     pattern::Seen,
     rig, short,
 };
@@ -170,6 +170,9 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
          only camsim's own error and that of finding circles."
     ));
     let found = [find(setup, 0, u64::MAX)?, find(setup, 1, u64::MAX)?];
+    if let Some((calibration, _)) = calibrations(setup.width_px).iter().zip(&found).find(|(_, found)| found.pairs.is_empty()) {
+        return Err(ReproduceError::NoCircle { calibration: calibration.name, width_px: setup.width_px, least_px: LEAST_PX });
+    }
     let mut table = Table::new(
         "Centres of the area of the circles, px",
         &[
@@ -207,16 +210,12 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
     if setup.data.is_some() {
         report.tables.push(("calibrations", between(&found)));
     }
-    report.plots.push((
-        "radius",
-        Plot {
-            title: "Error of circle centres by their place in the picture".into(),
-            x_label: "distance from the principal point, px".into(),
-            y_label: "error, px RMS".into(),
-            log: [false, false],
-            series,
-        },
-    ));
+    match by_radius(series) {
+        Some(plot) => report.plots.push(("radius", plot)),
+        None => report
+            .notes
+            .push(format!("No plot by radius: no ring of the picture has {RING_CIRCLES} circles found; wider pictures have more.")),
+    }
     report.tables.push(("inverse", inverse(setup)?));
     let [opencv, agisoft] = found;
     let mut shown = Vec::new();
@@ -249,6 +248,17 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         });
     }
     Ok(report)
+}
+
+/// The plot of [`Found::rings`]; `None` where every calibration's are empty, which is nothing to draw.
+fn by_radius(series: Vec<Series>) -> Option<Plot> {
+    series.iter().any(|series| !series.points.is_empty()).then(|| Plot {
+        title: "Error of circle centres by their place in the picture".into(),
+        x_label: "distance from the principal point, px".into(),
+        y_label: "error, px RMS".into(),
+        log: [false, false],
+        series,
+    })
 }
 
 fn model(calibration: &Calibration) -> Result<CameraModel, ReproduceError> {
@@ -354,6 +364,13 @@ fn between([opencv, agisoft]: &[Found; 2]) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rings_are_plotted_where_one_is_full() {
+        let series = |points: &[(f64, f64)]| Series { name: String::new(), points: points.to_vec(), joined: true };
+        assert_eq!(by_radius(vec![series(&[]), series(&[])]), None);
+        assert!(by_radius(vec![series(&[]), series(&[(10.0, 0.1)])]).is_some_and(|plot| plot.svg().is_ok()));
+    }
 
     #[test]
     fn calibrations_are_those_of_the_files() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use camsim_core::{reference::ErrorStats, scenario::ShutterSpec, sequence::Sequence};
+use camsim_core::{scenario::ShutterSpec, sequence::Sequence};
 use glam::DVec2;
 
 use super::{
@@ -75,7 +75,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         let own = rig::picture(setup.engine, &bench)?;
         for (method, frame) in [("paper: RK2 from the frame of the stamp", &paper), ("camsim", &own)] {
             let found = look(&bench, name, frame)?;
-            let stats = ErrorStats::of(found.circles.errors_px());
+            let stats = found.circles.stats();
             table.row([
                 name.into(),
                 method.into(),

@@ -54,7 +54,7 @@ pub(super) fn errors(places: &[DVec2], focal_px: f64, axis: DVec3) -> Vec<StepEr
 /// Distance between true circle centres and those found in a picture, pixels RMS, and how many were missed.
 fn measured(frame: &RenderedFrame, seen: &[super::pattern::Seen]) -> (f64, usize) {
     let found = matches(seen, &spots(frame));
-    (ErrorStats::of(found.errors_px()).rms_px, found.missed)
+    (found.stats().rms_px, found.missed)
 }
 
 pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
