@@ -29,7 +29,7 @@ mod render;
 use clock::Clock;
 use eye::Eye;
 use ground::Ground;
-pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, coord_errors, image_errors, silhouettes};
+pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, coord_errors, image_errors, silhouettes};
 use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;

@@ -13,14 +13,12 @@ use crate::{
     pose::CameraPose,
     scene::{LodSelection, TerrainHit},
     shutter::Shutter,
+    silhouette::{NEAR_PX, may_step, steps},
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
 };
 
 /// Look-ups that are tried.
 pub(super) const MAX_LOOK_UPS: usize = 8;
-/// A second difference of inverse depth, relative to the nearest, beyond what one surface has; and how far neighbours are.
-const STEP: f64 = 0.02;
-const NEAR_PX: [f64; 2] = [1.5, 3.0];
 /// Relative difference of depth beyond which something else stands before a point.
 const HIDDEN: f64 = 1e-3;
 
@@ -196,7 +194,7 @@ impl Trial<'_> {
         truth.is_hidden() || self.near_a_step(probe, truth)
     }
 
-    /// Inverse depth is linear over a plane: its second difference tells a step from a slope.
+    /// Along four lines through the probe, at its own instant.
     fn near_a_step(&self, probe: &Probe, truth: &Truth) -> bool {
         let pose = self.path.pose(truth.t_s);
         let look = |offset_px: DVec2| {
@@ -204,11 +202,11 @@ impl Trial<'_> {
             self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
         };
         let here = look(DVec2::ZERO);
-        NEAR_PX.iter().any(|&px| {
-            [DVec2::X, DVec2::Y, DVec2::ONE, DVec2::new(1.0, -1.0)].into_iter().any(|along| {
-                let (before, after) = (look(-px * along), look(px * along));
-                (before - 2.0 * here + after).abs() > STEP * before.max(here).max(after)
-            })
+        [DVec2::X, DVec2::Y, DVec2::ONE, DVec2::new(1.0, -1.0)].into_iter().any(|along| {
+            let at_px = |place: f64| 0.5 * (place - 2.0) * f64::from(NEAR_PX) * along;
+            let seen: [f64; 5] = std::array::from_fn(|place| if place == 2 { here } else { look(at_px(place as f64)) });
+            let steps_after = |place: usize| steps(seen[place], seen[place + 1], |share| look(at_px(place as f64 + share)));
+            (0..3).any(|place| may_step([seen[place], seen[place + 1], seen[place + 2]]) && (steps_after(place) || steps_after(place + 1)))
         })
     }
 }

@@ -32,6 +32,8 @@ use crate::{
 
 /// Times the largest error found.
 const SAFETY: f64 = 1.25;
+/// Share of the pixels that may look outside of the ideal frame: more, and the 99th percentile is of no source at all.
+pub(crate) const MOST_VOID_SHARE: f64 = 0.01;
 /// Part of the tolerance that the level of detail may take.
 const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
@@ -69,11 +71,14 @@ pub struct Predicted {
     pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose.
+    /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose. Those that
+    /// are off by less were not asked, so it is a lower bound on the share that is at silhouettes.
     pub silhouette_share: f64,
+    /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
+    pub void_share: f64,
     /// Probes with a source.
     pub probes: u32,
-    /// Whether `total_px` is within `quality.max_error_px`.
+    /// Whether `total_px` is within `quality.max_error_px`, and no more than a hundredth of the probes are void.
     pub kept: bool,
     /// If not: what is in the way.
     pub in_the_way: Option<String>,
@@ -286,7 +291,10 @@ impl Forecast<'_> {
             TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
         };
-        let kept = total_px <= max_error_px;
+        let (probes, tried) = (self.outcomes.len(), case.reach.probes.len());
+        let void_share = 1.0 - probes as f64 / tried.max(1) as f64;
+        let covered = probes > 0 && void_share <= MOST_VOID_SHARE;
+        let kept = total_px <= max_error_px && covered;
         let causes = [
             (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
@@ -294,8 +302,12 @@ impl Forecast<'_> {
             (depth_px, "depth between the pixels of the ideal frame"),
             (nodes_px, "the straight stretches between the exposure's nodes"),
         ];
-        let largest = causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| !kept);
-        let probes = self.outcomes.len() as u32;
+        let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
+        let in_the_way = match (kept, covered) {
+            (true, _) => None,
+            (false, true) => largest(),
+            (false, false) => Some(format!("the ideal frame: {:.1} % of the pixels see what lies outside of it", 100.0 * void_share)),
+        };
         let apart = self.truths.looked.iter().filter(|looked| looked.apart.get() == Some(&true)).count();
         Predicted {
             lens_px,
@@ -309,10 +321,11 @@ impl Forecast<'_> {
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,
-            silhouette_share: apart as f64 / f64::from(probes.max(1)),
-            probes,
+            silhouette_share: apart as f64 / probes.max(1) as f64,
+            void_share,
+            probes: probes as u32,
             kept,
-            in_the_way: largest.map(|(px, what)| format!("{what}: {px:.2e} px")),
+            in_the_way,
         }
     }
 
