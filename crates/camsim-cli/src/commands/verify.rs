@@ -280,16 +280,25 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
             "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
         // 1/255 RMS; the two estimates are independent of each other.
-        let estimate_dn = resampling_dn.hypot(*blur_dn);
-        let estimate = if estimate_dn > 0.0 { format!("{:.2} dB", -20.0 * (estimate_dn / 255.0).log10()) } else { "no error".to_owned() };
-        console.line(format_args!("       | estimated without silhouettes: {estimate}"))?;
+        console.line(format_args!("       | estimated without silhouettes: {}", estimate(resampling_dn.hypot(*blur_dn))))?;
     }
     Ok(())
+}
+
+/// An RMS error in 1/255 as PSNR.
+fn estimate(rms_dn: f64) -> String {
+    if rms_dn > 0.0 { format!("{:.2} dB", -20.0 * (rms_dn / 255.0).log10()) } else { "no error".to_owned() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_error_is_said_in_words() {
+        assert_eq!(estimate(2.55), "40.00 dB");
+        assert_eq!(estimate(0.0), "no error");
+    }
 
     #[test]
     fn frames_are_spread_from_the_first_to_the_last() {

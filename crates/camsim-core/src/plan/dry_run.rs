@@ -21,6 +21,8 @@ use crate::{
 pub(super) const MAX_LOOK_UPS: usize = 8;
 /// Relative difference of depth beyond which something else stands before a point.
 const HIDDEN: f64 = 1e-3;
+/// Lines of three through three by three places, the border's first.
+const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
 /// A frame to be tried.
 #[derive(Clone, Copy)]
@@ -194,20 +196,17 @@ impl Trial<'_> {
         truth.is_hidden() || self.near_a_step(probe, truth)
     }
 
-    /// Along four lines through the probe, at its own instant.
+    /// At its own instant, along rows, columns and diagonals of three by three places: what crosses the square crosses its border.
     fn near_a_step(&self, probe: &Probe, truth: &Truth) -> bool {
         let pose = self.path.pose(truth.t_s);
-        let look = |offset_px: DVec2| {
-            let uv = probe.uv + probe.uv_from_px * offset_px;
+        let look = |place: DVec2| {
+            let uv = probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * place);
             self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
         };
-        let here = look(DVec2::ZERO);
-        [DVec2::X, DVec2::Y, DVec2::ONE, DVec2::new(1.0, -1.0)].into_iter().any(|along| {
-            let at_px = |place: f64| 0.5 * (place - 2.0) * f64::from(NEAR_PX) * along;
-            let seen: [f64; 5] = std::array::from_fn(|place| if place == 2 { here } else { look(at_px(place as f64)) });
-            let steps_after = |place: usize| steps(seen[place], seen[place + 1], |share| look(at_px(place as f64 + share)));
-            (0..3).any(|place| may_step([seen[place], seen[place + 1], seen[place + 2]]) && (steps_after(place) || steps_after(place + 1)))
-        })
+        let places: [DVec2; 9] = std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
+        let seen = places.map(look);
+        let steps_between = |a: usize, b: usize| steps(seen[a], seen[b], |share| look(places[a].lerp(places[b], share)));
+        LINES.iter().any(|&[a, b, c]| may_step([seen[a], seen[b], seen[c]]) && (steps_between(a, b) || steps_between(b, c)))
     }
 }
 

@@ -40,6 +40,8 @@ const DETAIL_SHARE: f64 = 0.3;
 const BOUND_SHARE: f64 = 0.5;
 /// Steps of eq. 18 up to which it takes less time than a look-up of depth in every node.
 const CHEAP_RK2_STEPS: f64 = 2.0;
+/// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
+const SHARE_STEP: usize = 5;
 /// Probes whose exposure is looked at.
 const CHORD_PROBES: usize = 32;
 /// Stretches of path looked at for each of them.
@@ -71,8 +73,8 @@ pub struct Predicted {
     pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose. Those that
-    /// are off by less were not asked, so it is a lower bound on the share that is at silhouettes.
+    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. Of one probe in five, so by some
+    /// hundredths.
     pub silhouette_share: f64,
     /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
     pub void_share: f64,
@@ -137,7 +139,10 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
         Some(temporal) => Way { temporal, blur: case.blur },
         None => forecast.choose(tolerance_px, case.ways(motion, edges, may_skip_depth)),
     };
-    let predicted = forecast.predict(case, way);
+    let mut predicted = forecast.predict(case, way);
+    if edges != EdgeStage::None {
+        predicted.silhouette_share = forecast.truths.silhouette_share();
+    }
     Choice { way, terrain_error_px, predicted }
 }
 
@@ -226,8 +231,17 @@ impl<'a> Truths<'a> {
         let counted = self.looked.iter().enumerate().filter(|(_, looked)| looked.apart.get() != Some(&true));
         let mut order: Vec<(f64, &Looked)> = counted.map(|(i, looked)| (of(i, looked), looked)).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let is_apart = |looked: &Looked| *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth));
-        order.into_iter().find(|(px, looked)| *px == 0.0 || !is_apart(looked)).map_or(0.0, |(px, _)| px)
+        order.into_iter().find(|(px, looked)| *px == 0.0 || !self.is_apart(looked)).map_or(0.0, |(px, _)| px)
+    }
+
+    fn is_apart(&self, looked: &Looked) -> bool {
+        *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth))
+    }
+
+    fn silhouette_share(&self) -> f64 {
+        let asked: Vec<&Looked> = self.looked.iter().step_by(SHARE_STEP).collect();
+        let apart = asked.par_iter().with_min_len(8).filter(|looked| self.is_apart(looked)).count();
+        apart as f64 / asked.len().max(1) as f64
     }
 
     fn forecast(self, lod: &'a LodSelection) -> Forecast<'a> {
@@ -308,7 +322,6 @@ impl Forecast<'_> {
             (false, true) => largest(),
             (false, false) => Some(format!("the ideal frame: {:.1} % of the pixels see what lies outside of it", 100.0 * void_share)),
         };
-        let apart = self.truths.looked.iter().filter(|looked| looked.apart.get() == Some(&true)).count();
         Predicted {
             lens_px,
             temporal_px,
@@ -321,7 +334,7 @@ impl Forecast<'_> {
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,
-            silhouette_share: apart as f64 / probes.max(1) as f64,
+            silhouette_share: 0.0,
             void_share,
             probes: probes as u32,
             kept,
