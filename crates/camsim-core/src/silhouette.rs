@@ -1,9 +1,12 @@
 //! What a silhouette is. One definition for errors that are measured and for errors that are predicted; no picture depends on it.
 //!
 //! A silhouette is a step of depth at one instant: inverse depth that still changes by more than [`STEP`] of the nearer one when the two rays
-//! are brought to 1/256 of their distance. A slope, however oblique, and a crease change by 1/256 then; a step stays. The border of the sky
-//! is a step of all of it.
+//! are brought to 1/256 of their distance. A slope, however oblique, changes by 1/256 then; a step stays. The border of the sky is a step of all
+//! of it. Where depth bends by more than [`FOLD`] from one pixel to the next, as at the foot of a wall, it counts too: the renderer cannot tell
+//! such a fold from a step and casts rays of its own there.
 
+/// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend counts: that of `resolve.wgsl`.
+pub(crate) const FOLD: f64 = 0.01;
 /// Relative change of inverse depth.
 pub(crate) const STEP: f64 = 0.005;
 /// Distance from a silhouette within which a pixel counts as "at" it, output pixels.
@@ -12,8 +15,13 @@ pub(crate) const NEAR_PX: u32 = 3;
 const HALVINGS: u32 = 8;
 
 /// Whether inverse depths at three even places may have a step between them: over a plane they lie on a straight line. Saves most looks.
-pub(crate) fn may_step([a, b, c]: [f64; 3]) -> bool {
-    (a - 2.0 * b + c).abs() > STEP * a.max(b).max(c)
+pub(crate) fn may_step(inverse_depths: [f64; 3]) -> bool {
+    bends(inverse_depths, STEP)
+}
+
+/// Whether inverse depths at three even places bend by more than a share of the nearest one.
+pub(crate) fn bends([a, b, c]: [f64; 3], share: f64) -> bool {
+    (a - 2.0 * b + c).abs() > share * a.max(b).max(c)
 }
 
 /// Whether there is a step between two rays with the given inverse depths, 0 for the sky. `between` is that of the ray at a share of the way.

@@ -13,7 +13,7 @@ use crate::{
     pose::CameraPose,
     scene::{LodSelection, TerrainHit},
     shutter::Shutter,
-    silhouette::{NEAR_PX, may_step, steps},
+    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
 };
 
@@ -191,13 +191,14 @@ impl Trial<'_> {
         }
     }
 
-    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it.
-    pub fn at_silhouette(&self, probe: &Probe, truth: &Truth) -> bool {
-        truth.is_hidden() || self.near_a_step(probe, truth)
+    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it; with
+    /// `folds` also a fold.
+    pub fn at_silhouette(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
+        truth.is_hidden() || self.near_a_step(probe, truth, folds)
     }
 
     /// At its own instant, along rows, columns and diagonals of three by three places: what crosses the square crosses its border.
-    fn near_a_step(&self, probe: &Probe, truth: &Truth) -> bool {
+    fn near_a_step(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
         let pose = self.path.pose(truth.t_s);
         let look = |place: DVec2| {
             let uv = probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * place);
@@ -206,7 +207,12 @@ impl Trial<'_> {
         let places: [DVec2; 9] = std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
         let seen = places.map(look);
         let steps_between = |a: usize, b: usize| steps(seen[a], seen[b], |share| look(places[a].lerp(places[b], share)));
-        LINES.iter().any(|&[a, b, c]| may_step([seen[a], seen[b], seen[c]]) && (steps_between(a, b) || steps_between(b, c)))
+        LINES.iter().any(|&[a, b, c]| {
+            let of_line = [seen[a], seen[b], seen[c]];
+            // Between places 3 px apart a crease bends threefold.
+            let fold = folds && bends(of_line, f64::from(NEAR_PX) * FOLD);
+            fold || (may_step(of_line) && (steps_between(a, b) || steps_between(b, c)))
+        })
     }
 }
 

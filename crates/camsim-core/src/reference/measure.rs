@@ -9,7 +9,7 @@ use super::{KeyFrame, Look, Oracle};
 use crate::{
     frame::RenderedFrame,
     plan::{FramePlan, MOST_VOID_SHARE},
-    silhouette::{NEAR_PX, may_step, steps},
+    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
 };
 
 /// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for the frame.
@@ -273,7 +273,7 @@ fn looks(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<Look>> {
         .collect()
 }
 
-/// Pixels beside a step of depth at their own instant. Where neighbours' looks suggest one, the pixel's camera looks for itself: a neighbour
+/// Pixels beside a step or at a fold of depth at their own instant. Where neighbours' looks suggest one, the pixel's camera looks for itself: a neighbour
 /// of another instant may see another place, and one of the other field surely does.
 fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
     let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
@@ -282,14 +282,15 @@ fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
     let beside = |before: usize, i: usize, after: usize| {
         let (Some(before), Some(here), Some(after)) = (&looks[before], &looks[i], &looks[after]) else { return false };
         let seen = inverse_depth(here);
-        let steps_to = |other: &Look| {
-            let towards = |share: f64| {
-                let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
-                oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
-            };
-            steps(seen, towards(1.0), towards)
+        if !may_step([inverse_depth(before), seen, inverse_depth(after)]) {
+            return false;
+        }
+        let towards = |other: &Look, share: f64| {
+            let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
+            oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
         };
-        may_step([inverse_depth(before), seen, inverse_depth(after)]) && (steps_to(before) || steps_to(after))
+        let [a, c] = [before, after].map(|other| towards(other, 1.0));
+        bends([a, seen, c], FOLD) || steps(seen, a, |share| towards(before, share)) || steps(seen, c, |share| towards(after, share))
     };
     (0..looks.len())
         .into_par_iter()
