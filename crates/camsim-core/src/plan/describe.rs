@@ -178,7 +178,7 @@ impl Predicted {
             writeln!(f, "  {px:.2e} {cause}{more}")?;
         }
         if silhouette_share > 0.0 {
-            writeln!(f, "  apart: about {:.0} % of the pixels, which stand at a silhouette", 100.0 * silhouette_share)?;
+            writeln!(f, "  apart: at least {:.0} % of the pixels, at a step or fold of depth", 100.0 * silhouette_share)?;
         }
         writeln!(
             f,

@@ -73,8 +73,8 @@ pub struct Predicted {
     pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. Of one probe in five, so by some
-    /// hundredths.
+    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. Of one probe in five, so to within some
+    /// hundredths, and too low where folds of depth lie between the nine rays that look for them.
     pub silhouette_share: f64,
     /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
     pub void_share: f64,
