@@ -22,6 +22,8 @@ pub enum FrameListError {
     Empty(String),
     /// A frame that the window does not have.
     Outside {
+        /// The option.
+        asked_by: &'static str,
         /// The frame.
         frame: u64,
         /// How many there are.
@@ -36,11 +38,11 @@ impl fmt::Display for FrameListError {
                 write!(f, "`{part}` is no frame range: write 7, 10..20 (without 20), 10..=20, 10.. or several of them with commas")
             }
             Self::Empty(part) => write!(f, "`{part}` holds no frame: the end must be above the start"),
-            Self::Outside { frame, frames } => {
+            Self::Outside { asked_by, frame, frames } => {
                 let last = frames.saturating_sub(1);
                 write!(
                     f,
-                    "--frames asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps"
+                    "{asked_by} asks for frame {frame}, but the sequence ends with frame {last}; widen flight.window_s or raise camera.fps"
                 )
             }
         }
@@ -95,7 +97,7 @@ impl FrameList {
         for part in &self.0 {
             let end = part.end.unwrap_or_else(|| frames.max(part.first + 1));
             if end > frames {
-                return Err(FrameListError::Outside { frame: part.first.max(frames).min(end - 1), frames });
+                return Err(FrameListError::Outside { asked_by: "--frames", frame: part.first.max(frames).min(end - 1), frames });
             }
             list.extend(part.first..end);
         }
@@ -162,11 +164,12 @@ mod tests {
 
     #[test]
     fn frames_outside_are_named() {
-        assert_eq!(frames("5..12", 10), Err(FrameListError::Outside { frame: 10, frames: 10 }));
-        assert_eq!(frames("20", 10), Err(FrameListError::Outside { frame: 20, frames: 10 }));
-        assert_eq!(frames("12..", 10), Err(FrameListError::Outside { frame: 12, frames: 10 }));
+        let outside = |frame: u64| Err(FrameListError::Outside { asked_by: "--frames", frame, frames: 10 });
+        assert_eq!(frames("5..12", 10), outside(10));
+        assert_eq!(frames("20", 10), outside(20));
+        assert_eq!(frames("12..", 10), outside(12));
         // A huge range is refused before it is listed.
-        assert_eq!(frames("0..18446744073709551615", 10), Err(FrameListError::Outside { frame: 10, frames: 10 }));
+        assert_eq!(frames("0..18446744073709551615", 10), outside(10));
     }
 
     #[test]

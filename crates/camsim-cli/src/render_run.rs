@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::{plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
+use camsim_core::{frame::RenderedFrame, plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
 use camsim_gpu::engine::Finished;
 use camsim_io::{
     manifest::{ResumeError, RunManifest, check_resume, in_shard},
@@ -93,12 +93,13 @@ pub fn run(
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
-    let mut blind = 0_u64;
+    let (mut blind, mut empty) = (0_u64, 0_u64);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
     let rendered = source.render(&todo, &mut |finished| {
         look(&finished);
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
+        empty += u64::from(is_empty(&finished.frame));
         bar.inc(1);
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
     });
@@ -110,6 +111,13 @@ pub fn run(
             todo.len()
         ));
     }
+    if empty > 0 {
+        console.warn(format_args!(
+            "{empty} of {} frames have no valid pixel: no ray of the camera's is in the ideal frame, or the lens has none; check \
+             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain`",
+            todo.len()
+        ));
+    }
     let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);
     let time = begin.elapsed();
 
@@ -117,6 +125,11 @@ pub fn run(
     manifest.finished = true;
     manifest.write(job.folder).or_failed()?;
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time })
+}
+
+/// Whether nothing of a frame's colour is valid; a frame without colour is not known to be empty.
+fn is_empty(frame: &RenderedFrame) -> bool {
+    !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
 }
 
 /// Frames of another scenario are never taken for this one's; without `--resume` they are only worth a warning.

@@ -274,7 +274,7 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &scenario, "--set", "camera.fps"], "KEY=VALUE"),
         (vec!["render", &scenario, "--set", "camera.fpss=3"], "fps"),
         (vec!["render", &scenario, "--set", "camera.fps=-3"], "camera.fps"),
-        (vec!["explain", &scenario, "--frame", "60"], "ends with frame 59"),
+        (vec!["explain", &scenario, "--frame", "60"], "--frame asks for frame 60, but the sequence ends with frame 59"),
         (vec!["explain", &scenario, "--set", "flight.window_s=[1.0, 1.001]", "--set", "camera.phase=0.9"], "window_s"),
         (vec!["verify", &scenario, "--frames", "58..99"], "ends with frame 59"),
         (vec!["verify", "nowhere.toml"], "nowhere.toml"),

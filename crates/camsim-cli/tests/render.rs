@@ -164,3 +164,68 @@ fn the_measured_error_stands_beside_the_predicted_one() {
     let (code, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=0.002"]);
     assert!(code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"), "{out}{err}");
 }
+
+/// `verify` of the pattern, which is a plane, at 96x72.
+fn verify_small(more: &[&str]) -> (u8, String, String) {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let small = ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--frames", "3"];
+    camsim(&[&["verify", scenario.to_str().unwrap()][..], &small, more].concat())
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn two_fields_far_apart_do_not_hide_an_error() {
+    let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]"];
+    let fields = ["--json", "--set", "camera.shutter.interlace_ms=700", "--set", "quality.solver=linear"];
+    let (code, out, err) = verify_small(&[&centre[..], &fields].concat());
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let frame = &report["frames"][0];
+    assert!(code == 1 && report["kept"] == false && err.contains("is broken in frame 3"), "{out}{err}");
+    assert!(frame["measured"]["smooth"]["pixels"].as_u64().unwrap() > 6000 && frame["measured"]["judged_by"] == "smooth", "{frame}");
+    assert!(frame["measured"]["smooth"]["p99_px"].as_f64().unwrap() > 1.0 && frame["level_of_detail"].is_null(), "{frame}");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn an_empty_picture_is_neither_kept_nor_silent() {
+    // The paper's frustum is symmetric about the optical axis, which these pictures lie beside.
+    let pinhole = ["--set", "camera.lens.model=pinhole", "--set", "camera.lens.coefficients=[]"];
+    let beside = [&pinhole[..], &["--set", "camera.principal_point_px=[200, 150]", "--preset", "paper"]].concat();
+    let (code, out, err) = verify_small(&beside);
+    assert!(code == 1 && out.contains("6912") && out.contains("BROKEN as predicted: too many pixels"), "{out}{err}");
+    assert!(err.contains("the ideal frame: 100.0 % of the pixels"), "{err}");
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let render = |more: &[&str]| {
+        let args = ["render", scenario.to_str().unwrap(), "-o", folder.path().to_str().unwrap(), "--format", "none"];
+        let (code, _, err) = camsim(
+            &[&args[..], &["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]", "--frames", "3..5"], more].concat(),
+        );
+        assert_eq!(code, 0, "{err}");
+        err
+    };
+    assert!(render(&beside).contains("2 of 2 frames have no valid pixel"));
+    assert!(!render(&["--set", "camera.principal_point_px=[47.5, 35.5]"]).contains("no valid pixel"));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml");
+    let verify = |more: &[&str]| {
+        let small = ["--set", "camera.size_px=[80, 60]", "--set", "camera.principal_point_px=[39.5, 29.5]"];
+        camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "0"][..], &small, more].concat())
+    };
+    // Coarse terrain leaves the source coordinates as they are, and is said beside them.
+    let off_px = |tolerance: &str| {
+        let (_, out, err) = verify(&["--json", "--set", &format!("quality.max_terrain_error_px={tolerance}")]);
+        let report: serde_json::Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{out}{err}"));
+        let detail = &report["frames"][0]["level_of_detail"];
+        assert!(detail["triangles"].as_u64().unwrap() > 0, "{detail}");
+        detail["max_error_px"].as_f64().unwrap()
+    };
+    let [fine, coarse] = ["0.25", "20"].map(off_px);
+    assert!(fine <= 0.25 && coarse > 1.0 && coarse <= 20.0, "{fine} {coarse}");
+    let (code, out, err) = verify(&[]);
+    assert!(code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")), "{out}{err}");
+}

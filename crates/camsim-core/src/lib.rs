@@ -59,4 +59,6 @@ pub mod frame;
 
 pub mod metrics;
 
+mod silhouette;
+
 pub mod reference;

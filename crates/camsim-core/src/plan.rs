@@ -39,6 +39,7 @@ mod transfer;
 pub use bounds::LensReach;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
+pub(crate) use error::MOST_VOID_SHARE;
 pub use error::Predicted;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};

@@ -3,6 +3,7 @@
 //! It shares with the renderer and its twins the scenario, the trajectory (with the mount) and the lens's forward model, and nothing else:
 //! line times ([`clock`]), lens inverse ([`eye`]), zoom, ray casting ([`ray`], [`ground`], [`meshes`]), colour ([`paint`]) and integration
 //! ([`render`]) are its own. The seeded photometric stage is the renderer's, since a seed has no other meaning than its noise.
+//! What its measurements count apart as a silhouette is defined once, for them and for the plan's prediction.
 
 use std::sync::{Arc, Mutex};
 
@@ -29,7 +30,7 @@ mod render;
 use clock::Clock;
 use eye::Eye;
 use ground::Ground;
-pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, coord_errors, image_errors, silhouettes};
+pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, coord_errors, image_errors, silhouettes};
 use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;

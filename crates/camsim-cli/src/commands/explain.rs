@@ -4,6 +4,7 @@ use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, Solver},
     scene::select_lod,
+    sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
 use camsim_io::{load::Loaded, terrain::TerrainSummary};
@@ -61,10 +62,11 @@ struct Tracker {
 
 /// What the ideal frame draws of the terrain.
 #[derive(Serialize)]
-struct LevelOfDetail {
-    triangles: u64,
-    max_error_px: f64,
-    tolerance_px: f64,
+pub(super) struct LevelOfDetail {
+    pub(super) triangles: u64,
+    /// Bound on how far the drawn terrain is from the full one, px of the ideal frame.
+    pub(super) max_error_px: f64,
+    pub(super) tolerance_px: f64,
 }
 
 #[derive(Serialize)]
@@ -85,7 +87,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let loaded = inputs::load(&scenario, console)?;
     let frames = loaded.sequence.frames;
     if args.frame >= frames {
-        return Err(Failure::bad_input(FrameListError::Outside { frame: args.frame, frames }));
+        return Err(Failure::bad_input(FrameListError::Outside { asked_by: "--frame", frame: args.frame, frames }));
     }
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         console
@@ -94,7 +96,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let planner = Planner::new(loaded.sequence.clone(), &scenario.output.channels, MAX_SIDE_PX).or_bad_input()?;
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
-    let level_of_detail = level_of_detail(&loaded, &plan);
+    let level_of_detail = level_of_detail(&loaded.sequence, &plan);
     let tracked = &loaded.tracked;
     let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
@@ -122,8 +124,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 }
 
 /// The choice that the ideal pass makes.
-fn level_of_detail(loaded: &Loaded, plan: &FramePlan) -> Option<LevelOfDetail> {
-    let terrain = loaded.sequence.scene.terrain.as_ref()?;
+pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
+    let terrain = sequence.scene.terrain.as_ref()?;
     let tolerance_px = plan.terrain_error_px;
     let lod = select_lod(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
     Some(LevelOfDetail { triangles: lod.triangles, max_error_px: lod.max_error_px, tolerance_px })

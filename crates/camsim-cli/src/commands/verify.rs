@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     plan::{FramePlan, Predicted},
-    reference::{CoordErrors, ErrorStats, KeyFrame, Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
+    reference::{CoordErrors, ErrorStats, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
     scenario::{Auto, Channel, Solver},
 };
 use camsim_gpu::{
@@ -14,6 +14,7 @@ use camsim_gpu::{
 };
 use serde::Serialize;
 
+use super::explain::{LevelOfDetail, level_of_detail};
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
@@ -29,7 +30,11 @@ const DEFAULT_FRAMES: u64 = 5;
 /// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its own instant the plan has looked,
 /// in pixels of the ideal frame. Pixels within 3 px of a silhouette, or whose point the ideal frame does not see, are counted apart. With an
 /// exposure several of its instants are measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is
-/// above quality.max_error_px.
+/// above quality.max_error_px. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
+/// a hundredth is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
+///
+/// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
+/// errors hold only what it does to parallax. What it does to the picture is measured by --pictures.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -64,7 +69,9 @@ struct Verified {
     frame: u64,
     predicted: Predicted,
     measured: Measured,
-    /// Whether the measured 99th percentile is within the tolerance, and within the prediction.
+    /// The terrain as drawn.
+    level_of_detail: Option<LevelOfDetail>,
+    /// Whether the 99th percentile that the frame is judged by is within the tolerance, and within the prediction.
     kept: bool,
     as_predicted: bool,
     picture: Option<Picture>,
@@ -76,6 +83,9 @@ struct Measured {
     smooth: Figures,
     silhouettes: Figures,
     all: Figures,
+    /// Whose 99th percentile is held to the tolerance: "smooth", "all" where hardly any pixel is smooth, or "nothing" where too many are
+    /// falsely valid or missing.
+    judged_by: &'static str,
     falsely_valid: u64,
     missing: u64,
 }
@@ -124,8 +134,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let tolerance_px = scenario.quality.max_error_px;
     let mut report = Report { adapter, tolerance_px, kept: true, frames: Vec::new() };
     if !args.json {
+        let allowed_px = scenario.quality.max_terrain_error_px;
         console
             .line(format_args!("errors of source coordinates in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"))?;
+        console.line(format_args!(
+            "terrain off: bound on how far the drawn terrain is from the full one, px; quality.max_terrain_error_px allows {allowed_px}"
+        ))?;
         console.line(HEADER)?;
     }
     for &frame in &frames {
@@ -143,8 +157,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     let broken: Vec<String> = report.frames.iter().filter(|frame| !frame.kept).map(|frame| frame.frame.to_string()).collect();
-    let planned = report.frames.iter().find(|frame| !frame.kept).and_then(|frame| frame.predicted.in_the_way.clone());
-    let why = planned.map_or_else(|| "the plan did not expect it".to_owned(), |cause| format!("in the way is {cause}"));
+    let first = report.frames.iter().find(|frame| !frame.kept);
+    let why = match first.map(|frame| (&frame.predicted.in_the_way, frame.measured.judged_by)) {
+        Some((Some(cause), _)) => format!("in the way is {cause}"),
+        Some((None, VOID)) => "too many pixels have a source only in one of the two pictures, or there is none".to_owned(),
+        _ => "the plan did not expect it".to_owned(),
+    };
     Err(Failure::failed(anyhow!("the tolerance of {tolerance_px} px is broken in frame {}: {why}", broken.join(", "))))
 }
 
@@ -159,14 +177,16 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     let mut errors = measure(oracle, &first, 0.0)?;
     for phase in phases(&first.plan) {
         let found = measure(oracle, &at_phase(session, frame, phase)?, f64::from(phase))?;
-        if found.smooth.p99_px > errors.smooth.p99_px {
+        if found.judged().p99_px() > errors.judged().p99_px() {
             errors = found;
         }
     }
-    let p99_px = errors.smooth.p99_px;
+    let judged = errors.judged();
+    let p99_px = judged.p99_px();
     let picture = pictures.then(|| picture(oracle, &first));
     Ok(Verified {
         frame,
+        level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
         kept: p99_px <= tolerance_px,
         as_predicted: p99_px <= first.plan.predicted.total_px,
         predicted: first.plan.predicted,
@@ -174,6 +194,11 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
             smooth: errors.smooth.into(),
             silhouettes: errors.silhouettes.into(),
             all: errors.all.into(),
+            judged_by: match judged {
+                Judged::Smooth(_) => "smooth",
+                Judged::Everywhere(_) => "all",
+                Judged::Void => VOID,
+            },
             falsely_valid: errors.falsely_valid,
             missing: errors.missing,
         },
@@ -221,12 +246,16 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
     }
 }
 
+/// Where no percentile stands for the frame.
+const VOID: &str = "nothing";
+
 const HEADER: &str =
-    " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing |";
+    " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain off |";
 
 fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
-    let Measured { smooth, silhouettes, all, falsely_valid, missing } = measured;
+    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing } = measured;
+    let terrain_off = verified.level_of_detail.as_ref().map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
     let share = 100.0 * silhouettes.pixels as f64 / all.pixels.max(1) as f64;
     let verdict = match (verified.kept, verified.as_predicted) {
         (true, true) => "kept",
@@ -234,8 +263,13 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         (false, _) if predicted.kept => "BROKEN against the prediction",
         (false, _) => "BROKEN as predicted",
     };
+    let why = match *judged_by {
+        "all" => format!(": hardly a pixel away from silhouettes, {:.2e} px of all", all.p99_px),
+        VOID => ": too many pixels without a source".to_owned(),
+        _ => String::new(),
+    };
     console.line(format_args!(
-        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {verdict}",
+        "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
     let Predicted { resampling_dn, blur_dn, .. } = predicted;
@@ -246,15 +280,25 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
             "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
         // 1/255 RMS; the two estimates are independent of each other.
-        let estimate_db = -20.0 * (resampling_dn.hypot(*blur_dn) / 255.0).log10();
-        console.line(format_args!("       | estimated without silhouettes: {estimate_db:.2} dB"))?;
+        console.line(format_args!("       | estimated without silhouettes: {}", estimate(resampling_dn.hypot(*blur_dn))))?;
     }
     Ok(())
+}
+
+/// An RMS error in 1/255 as PSNR.
+fn estimate(rms_dn: f64) -> String {
+    if rms_dn > 0.0 { format!("{:.2} dB", -20.0 * (rms_dn / 255.0).log10()) } else { "no error".to_owned() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_error_is_said_in_words() {
+        assert_eq!(estimate(2.55), "40.00 dB");
+        assert_eq!(estimate(0.0), "no error");
+    }
 
     #[test]
     fn frames_are_spread_from_the_first_to_the_last() {

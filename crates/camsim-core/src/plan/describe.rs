@@ -157,6 +157,9 @@ impl Predicted {
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, .. } = *self;
         writeln!(f, "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)")?;
+        if probes == 0 {
+            return writeln!(f, "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty");
+        }
         let verdict = if self.kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" };
         writeln!(f, "  at most {total_px:.2e} in all, from dry runs of {probes} pixels: {verdict}")?;
         if let Some(cause) = &self.in_the_way {
@@ -175,7 +178,7 @@ impl Predicted {
             writeln!(f, "  {px:.2e} {cause}{more}")?;
         }
         if silhouette_share > 0.0 {
-            writeln!(f, "  apart: {:.1} % of the pixels tried stand at a silhouette and are off by more", 100.0 * silhouette_share)?;
+            writeln!(f, "  apart: at least {:.0} % of the pixels, at a step or fold of depth", 100.0 * silhouette_share)?;
         }
         writeln!(
             f,

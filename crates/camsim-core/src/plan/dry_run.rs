@@ -13,16 +13,16 @@ use crate::{
     pose::CameraPose,
     scene::{LodSelection, TerrainHit},
     shutter::Shutter,
+    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
 };
 
 /// Look-ups that are tried.
 pub(super) const MAX_LOOK_UPS: usize = 8;
-/// A second difference of inverse depth, relative to the nearest, beyond what one surface has; and how far neighbours are.
-const STEP: f64 = 0.02;
-const NEAR_PX: [f64; 2] = [1.5, 3.0];
 /// Relative difference of depth beyond which something else stands before a point.
 const HIDDEN: f64 = 1e-3;
+/// Lines of three through three by three places, the border's first.
+const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
 /// A frame to be tried.
 #[derive(Clone, Copy)]
@@ -191,24 +191,27 @@ impl Trial<'_> {
         }
     }
 
-    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it.
-    pub fn at_silhouette(&self, probe: &Probe, truth: &Truth) -> bool {
-        truth.is_hidden() || self.near_a_step(probe, truth)
+    /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it; with
+    /// `folds` also a fold.
+    pub fn at_silhouette(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
+        truth.is_hidden() || self.near_a_step(probe, truth, folds)
     }
 
-    /// Inverse depth is linear over a plane: its second difference tells a step from a slope.
-    fn near_a_step(&self, probe: &Probe, truth: &Truth) -> bool {
+    /// At its own instant, along rows, columns and diagonals of three by three places: what crosses the square crosses its border.
+    fn near_a_step(&self, probe: &Probe, truth: &Truth, folds: bool) -> bool {
         let pose = self.path.pose(truth.t_s);
-        let look = |offset_px: DVec2| {
-            let uv = probe.uv + probe.uv_from_px * offset_px;
+        let look = |place: DVec2| {
+            let uv = probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * place);
             self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv.extend(1.0)).map_or(0.0, |met| 1.0 / met.depth_m)
         };
-        let here = look(DVec2::ZERO);
-        NEAR_PX.iter().any(|&px| {
-            [DVec2::X, DVec2::Y, DVec2::ONE, DVec2::new(1.0, -1.0)].into_iter().any(|along| {
-                let (before, after) = (look(-px * along), look(px * along));
-                (before - 2.0 * here + after).abs() > STEP * before.max(here).max(after)
-            })
+        let places: [DVec2; 9] = std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
+        let seen = places.map(look);
+        let steps_between = |a: usize, b: usize| steps(seen[a], seen[b], |share| look(places[a].lerp(places[b], share)));
+        LINES.iter().any(|&[a, b, c]| {
+            let of_line = [seen[a], seen[b], seen[c]];
+            // Between places 3 px apart a crease bends threefold.
+            let fold = folds && bends(of_line, f64::from(NEAR_PX) * FOLD);
+            fold || (may_step(of_line) && (steps_between(a, b) || steps_between(b, c)))
         })
     }
 }

@@ -32,12 +32,16 @@ use crate::{
 
 /// Times the largest error found.
 const SAFETY: f64 = 1.25;
+/// Share of the pixels that may look outside of the ideal frame: more, and the 99th percentile is of no source at all.
+pub(crate) const MOST_VOID_SHARE: f64 = 0.01;
 /// Part of the tolerance that the level of detail may take.
 const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
 const BOUND_SHARE: f64 = 0.5;
 /// Steps of eq. 18 up to which it takes less time than a look-up of depth in every node.
 const CHEAP_RK2_STEPS: f64 = 2.0;
+/// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
+const SHARE_STEP: usize = 5;
 /// Probes whose exposure is looked at.
 const CHORD_PROBES: usize = 32;
 /// Stretches of path looked at for each of them.
@@ -69,11 +73,14 @@ pub struct Predicted {
     pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the probes that were set apart: off by more than the others, and at a silhouette or not seen from the key pose.
+    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. Of one probe in five, so to within some
+    /// hundredths, and too low where folds of depth lie between the nine rays that look for them.
     pub silhouette_share: f64,
+    /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
+    pub void_share: f64,
     /// Probes with a source.
     pub probes: u32,
-    /// Whether `total_px` is within `quality.max_error_px`.
+    /// Whether `total_px` is within `quality.max_error_px`, and no more than a hundredth of the probes are void.
     pub kept: bool,
     /// If not: what is in the way.
     pub in_the_way: Option<String>,
@@ -132,7 +139,10 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
         Some(temporal) => Way { temporal, blur: case.blur },
         None => forecast.choose(tolerance_px, case.ways(motion, edges, may_skip_depth)),
     };
-    let predicted = forecast.predict(case, way);
+    let mut predicted = forecast.predict(case, way);
+    if edges != EdgeStage::None {
+        predicted.silhouette_share = forecast.truths.silhouette_share();
+    }
     Choice { way, terrain_error_px, predicted }
 }
 
@@ -221,8 +231,18 @@ impl<'a> Truths<'a> {
         let counted = self.looked.iter().enumerate().filter(|(_, looked)| looked.apart.get() != Some(&true));
         let mut order: Vec<(f64, &Looked)> = counted.map(|(i, looked)| (of(i, looked), looked)).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let is_apart = |looked: &Looked| *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth));
-        order.into_iter().find(|(px, looked)| *px == 0.0 || !is_apart(looked)).map_or(0.0, |(px, _)| px)
+        order.into_iter().find(|(px, looked)| *px == 0.0 || !self.is_apart(looked)).map_or(0.0, |(px, _)| px)
+    }
+
+    /// Folds are not set apart here, so that the bound is on the safe side.
+    fn is_apart(&self, looked: &Looked) -> bool {
+        *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth, false))
+    }
+
+    fn silhouette_share(&self) -> f64 {
+        let asked: Vec<&Looked> = self.looked.iter().step_by(SHARE_STEP).collect();
+        let apart = asked.par_iter().with_min_len(8).filter(|looked| self.trial.at_silhouette(&looked.probe, &looked.truth, true)).count();
+        apart as f64 / asked.len().max(1) as f64
     }
 
     fn forecast(self, lod: &'a LodSelection) -> Forecast<'a> {
@@ -286,7 +306,10 @@ impl Forecast<'_> {
             TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
         };
-        let kept = total_px <= max_error_px;
+        let (probes, tried) = (self.outcomes.len(), case.reach.probes.len());
+        let void_share = 1.0 - probes as f64 / tried.max(1) as f64;
+        let covered = probes > 0 && void_share <= MOST_VOID_SHARE;
+        let kept = total_px <= max_error_px && covered;
         let causes = [
             (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
@@ -294,9 +317,12 @@ impl Forecast<'_> {
             (depth_px, "depth between the pixels of the ideal frame"),
             (nodes_px, "the straight stretches between the exposure's nodes"),
         ];
-        let largest = causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).filter(|_| !kept);
-        let probes = self.outcomes.len() as u32;
-        let apart = self.truths.looked.iter().filter(|looked| looked.apart.get() == Some(&true)).count();
+        let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
+        let in_the_way = match (kept, covered) {
+            (true, _) => None,
+            (false, true) => largest(),
+            (false, false) => Some(format!("the ideal frame: {:.1} % of the pixels see what lies outside of it", 100.0 * void_share)),
+        };
         Predicted {
             lens_px,
             temporal_px,
@@ -309,10 +335,11 @@ impl Forecast<'_> {
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,
-            silhouette_share: apart as f64 / f64::from(probes.max(1)),
-            probes,
+            silhouette_share: 0.0,
+            void_share,
+            probes: probes as u32,
             kept,
-            in_the_way: largest.map(|(px, what)| format!("{what}: {px:.2e} px")),
+            in_the_way,
         }
     }
 

@@ -81,6 +81,11 @@ impl Clock {
         matches!(self.readout, Readout::TopToBottom | Readout::BottomToTop)
     }
 
+    /// Rows from one to the next of the same field: 2 if the fields have times of their own.
+    pub(super) fn field_rows(&self) -> u32 {
+        if self.interlace_s > 0.0 { 2 } else { 1 }
+    }
+
     pub(super) fn exposure_s(&self) -> f64 {
         self.exposure_s
     }

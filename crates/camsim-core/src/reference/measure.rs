@@ -6,12 +6,14 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::{KeyFrame, Look, Oracle};
-use crate::{frame::RenderedFrame, plan::FramePlan};
+use crate::{
+    frame::RenderedFrame,
+    plan::{FramePlan, MOST_VOID_SHARE},
+    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
+};
 
-/// A second difference of inverse depth between neighbours, relative to the nearest of them, beyond what one smooth surface has.
-const STEP: f64 = 0.005;
-/// Distance from a silhouette within which pixels count as "at" it, output pixels.
-const NEAR_PX: usize = 3;
+/// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for the frame.
+const LEAST_SMOOTH_SHARE: f64 = 0.05;
 
 /// Errors of one kind of pixel, pixels of the ideal frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,6 +61,44 @@ pub struct CoordErrors {
     pub missing: u64,
 }
 
+/// By what a frame is held to `quality.max_error_px`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Judged {
+    /// The 99th percentile away from silhouettes, pixels of the ideal frame.
+    Smooth(f64),
+    /// Hardly any pixel (less than one in twenty) is away from silhouettes: the 99th percentile of all.
+    Everywhere(f64),
+    /// There is no such percentile: more than a hundredth of the pixels are falsely valid or missing, or there is none at all.
+    Void,
+}
+
+impl Judged {
+    /// The percentile; infinite if there is none.
+    #[must_use]
+    pub fn p99_px(self) -> f64 {
+        match self {
+            Self::Smooth(px) | Self::Everywhere(px) => px,
+            Self::Void => f64::INFINITY,
+        }
+    }
+}
+
+impl CoordErrors {
+    /// By what the frame is to be judged: nothing that was not measured counts as kept.
+    #[must_use]
+    pub fn judged(&self) -> Judged {
+        let void = self.falsely_valid + self.missing;
+        let pixels = self.all.count + void;
+        if self.all.count == 0 || void as f64 > MOST_VOID_SHARE * pixels as f64 {
+            Judged::Void
+        } else if (self.smooth.count as f64) < LEAST_SMOOTH_SHARE * self.all.count as f64 {
+            Judged::Everywhere(self.all.p99_px)
+        } else {
+            Judged::Smooth(self.smooth.p99_px)
+        }
+    }
+}
+
 /// What is compared of one pixel.
 enum Compared {
     Skipped,
@@ -80,8 +120,7 @@ impl CoordTruth {
     #[must_use]
     pub fn new(oracle: Arc<Oracle>, frame: u64, phase: f64) -> Self {
         let looks = looks(&oracle, frame, phase);
-        let size_px = oracle.sequence.scenario.camera.size_px;
-        let near = dilated(&edges(&looks, size_px), size_px);
+        let near = dilated(&oracle, &edges(&oracle, &looks));
         Self { oracle, looks, near }
     }
 
@@ -109,8 +148,7 @@ impl CoordTruth {
 #[must_use]
 pub fn coord_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
     let looks = looks(oracle, plan.frame, phase);
-    let size_px = oracle.sequence.scenario.camera.size_px;
-    compared(oracle, &looks, &dilated(&edges(&looks, size_px), size_px), plan, frame, step)
+    compared(oracle, &looks, &dilated(oracle, &edges(oracle, &looks)), plan, frame, step)
 }
 
 fn compared(
@@ -215,11 +253,11 @@ pub fn silhouettes(oracle: &Oracle, frame: u64, phases: &[f64]) -> Vec<bool> {
     let size_px = oracle.sequence.scenario.camera.size_px;
     let mut marked = vec![false; size_px[0] as usize * size_px[1] as usize];
     for &phase in phases {
-        for (marked, edge) in marked.iter_mut().zip(edges(&looks(oracle, frame, phase), size_px)) {
+        for (marked, edge) in marked.iter_mut().zip(edges(oracle, &looks(oracle, frame, phase))) {
             *marked |= edge;
         }
     }
-    dilated(&marked, size_px)
+    dilated(oracle, &marked)
 }
 
 /// What the centre of every pixel sees.
@@ -235,42 +273,76 @@ fn looks(oracle: &Oracle, frame: u64, phase: f64) -> Vec<Option<Look>> {
         .collect()
 }
 
-/// Pixels between whose neighbours depth steps: inverse depth is linear over a plane, so its second difference tells a step from a slope.
-fn edges(looks: &[Option<Look>], [width, height]: [u32; 2]) -> Vec<bool> {
-    let (width, height) = (width as usize, height as usize);
-    let inverse_depth = |i: usize| looks[i].map(|look| look.hit.map_or(0.0, |hit| 1.0 / hit.depth_m));
-    let steps = |before: usize, here: usize, after: usize| {
-        let (Some(a), Some(b), Some(c)) = (inverse_depth(before), inverse_depth(here), inverse_depth(after)) else { return false };
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        (low == 0.0 && high > 0.0) || (a - 2.0 * b + c).abs() > STEP * high
+/// Pixels beside a step or at a fold of depth at their own instant. Where neighbours' looks suggest one, the pixel's camera looks for itself: a neighbour
+/// of another instant may see another place, and one of the other field surely does.
+fn edges(oracle: &Oracle, looks: &[Option<Look>]) -> Vec<bool> {
+    let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
+    let field = oracle.clock.field_rows() as usize;
+    let inverse_depth = |look: &Look| look.hit.map_or(0.0, |hit| 1.0 / hit.depth_m);
+    let beside = |before: usize, i: usize, after: usize| {
+        let (Some(before), Some(here), Some(after)) = (&looks[before], &looks[i], &looks[after]) else { return false };
+        let seen = inverse_depth(here);
+        if !may_step([inverse_depth(before), seen, inverse_depth(after)]) {
+            return false;
+        }
+        let towards = |other: &Look, share: f64| {
+            let direction = here.pose.ned_from_camera * here.uv.lerp(other.uv, share).extend(1.0);
+            oracle.cast(here.pose.position_ned_m, direction).map_or(0.0, |hit| 1.0 / hit.depth_m)
+        };
+        let [a, c] = [before, after].map(|other| towards(other, 1.0));
+        bends([a, seen, c], FOLD) || steps(seen, a, |share| towards(before, share)) || steps(seen, c, |share| towards(after, share))
     };
     (0..looks.len())
         .into_par_iter()
         .map(|i| {
-            let (x, y) = (i % width, i / width);
+            let (x, y, row) = (i % width, i / width, field * width);
             let across = x > 0 && x + 1 < width;
-            let along = y > 0 && y + 1 < height;
-            (across && steps(i - 1, i, i + 1))
-                || (along && steps(i - width, i, i + width))
-                || (across && along && (steps(i - width - 1, i, i + width + 1) || steps(i - width + 1, i, i + width - 1)))
+            let along = y >= field && y + field < height;
+            (across && beside(i - 1, i, i + 1))
+                || (along && beside(i - row, i, i + row))
+                || (across && along && (beside(i - row - 1, i, i + row + 1) || beside(i - row + 1, i, i + row - 1)))
         })
         .collect()
 }
 
-/// All pixels within 3 of a marked one, along rows and columns.
-fn dilated(marked: &[bool], [width, height]: [u32; 2]) -> Vec<bool> {
-    let (width, height) = (width as usize, height as usize);
+/// All pixels within 3 of a marked one, along rows and columns, of the same field.
+fn dilated(oracle: &Oracle, marked: &[bool]) -> Vec<bool> {
+    let [width, height] = oracle.sequence.scenario.camera.size_px.map(|side| side as usize);
+    let (near, field) = (NEAR_PX as usize, oracle.clock.field_rows() as usize);
     let mut rows = vec![false; marked.len()];
     let mut all = vec![false; marked.len()];
     for (i, _) in marked.iter().enumerate().filter(|(_, marked)| **marked) {
         let (x, start) = (i % width, i - i % width);
-        rows[start + x.saturating_sub(NEAR_PX)..=start + (x + NEAR_PX).min(width - 1)].fill(true);
+        rows[start + x.saturating_sub(near)..=start + (x + near).min(width - 1)].fill(true);
     }
     for (i, _) in rows.iter().enumerate().filter(|(_, marked)| **marked) {
         let (x, y) = (i % width, i / width);
-        for y in y.saturating_sub(NEAR_PX)..=(y + NEAR_PX).min(height - 1) {
-            all[y * width + x] = true;
+        for row in (y.saturating_sub(near)..=(y + near).min(height - 1)).filter(|row| row.abs_diff(y).is_multiple_of(field)) {
+            all[row * width + x] = true;
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn errors(smooth: u64, silhouettes: u64, falsely_valid: u64, missing: u64) -> CoordErrors {
+        let of = |count, p99_px| ErrorStats { count, p99_px, ..ErrorStats::default() };
+        let all = of(smooth + silhouettes, 7.0);
+        CoordErrors { all, smooth: of(smooth, 0.01), silhouettes: of(silhouettes, 9.0), falsely_valid, missing }
+    }
+
+    #[test]
+    fn nothing_is_judged_by_what_was_not_measured() {
+        assert_eq!(errors(900, 100, 0, 0).judged(), Judged::Smooth(0.01));
+        assert_eq!(errors(900, 100, 5, 5).judged(), Judged::Smooth(0.01));
+        assert_eq!(errors(900, 100, 6, 5).judged(), Judged::Void);
+        assert_eq!(errors(0, 0, 0, 19200).judged(), Judged::Void);
+        assert_eq!(errors(0, 0, 0, 0).judged(), Judged::Void);
+        assert_eq!(errors(49, 951, 0, 0).judged(), Judged::Everywhere(7.0));
+        assert_eq!(errors(50, 950, 0, 0).judged(), Judged::Smooth(0.01));
+        assert!(Judged::Void.p99_px().is_infinite());
+    }
 }

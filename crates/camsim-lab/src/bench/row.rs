@@ -127,8 +127,10 @@ impl Row {
         self.coord_rms_px = Some(coords.all.rms_px);
         self.coord_p99_px = Some(coords.all.p99_px);
         self.coord_max_px = Some(coords.all.max_px);
-        self.smooth_rms_px = Some(coords.smooth.rms_px);
-        self.smooth_p99_px = Some(coords.smooth.p99_px);
+        // No pixel away from silhouettes says nothing of them.
+        let smooth = Some(coords.smooth).filter(|smooth| smooth.count > 0);
+        self.smooth_rms_px = smooth.map(|smooth| smooth.rms_px);
+        self.smooth_p99_px = smooth.map(|smooth| smooth.p99_px);
         self.edge_share = Some(coords.silhouettes.count as f64 / coords.all.count.max(1) as f64);
         (self.falsely_valid, self.missing) = (coords.falsely_valid, coords.missing);
         self.compared[0] = coords.all.count;
