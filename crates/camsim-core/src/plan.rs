@@ -344,7 +344,7 @@ impl Planner {
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
             (blur, edges)
         };
-        let expected = prospect.expect(sampling.scale, sampling.taps, blur);
+        let expected = prospect.expected(sampling.scale, sampling.taps, blur);
         let case = error::Case {
             reach: &reach,
             sequence: &self.sequence,

@@ -6,7 +6,7 @@
 //! such a fold from a step and casts rays of its own there.
 
 /// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend counts: that of `resolve.wgsl`.
-pub(crate) const FOLD: f64 = 0.01;
+pub(crate) use crate::temporal::edges::EDGE_STEP as FOLD;
 /// Relative change of inverse depth.
 pub(crate) const STEP: f64 = 0.005;
 /// Distance from a silhouette within which a pixel counts as "at" it, output pixels.

@@ -118,16 +118,7 @@ pub fn reproject(
     depth: &InverseDepthImage<'_>,
     ideal: &IdealGeometry,
 ) -> Option<Source> {
-    let (rotation, shift) = key_from_line;
-    let direction = rotation * uv.extend(1.0);
-    let mut w = 0.0;
-    for _ in 0..iterations {
-        let found = depth.inverse_depth(ideal.px_from_point(direction + w * shift));
-        w = depth_on_line(direction, shift, found).unwrap_or(w);
-    }
-    let in_key = direction + w * shift;
-    let at_px = ideal.px_from_point(in_key);
-    (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+    source_at(uv, key_from_line, settle(uv, key_from_line, iterations, depth, ideal).on_line, ideal)
 }
 
 /// The key frame's inverse depth that the last of `iterations` look-ups of [`reproject`] finds, 1/m.
@@ -139,23 +130,39 @@ pub fn settled_inverse_depth(
     depth: &InverseDepthImage<'_>,
     ideal: &IdealGeometry,
 ) -> f64 {
-    let (rotation, shift) = key_from_line;
-    let direction = rotation * uv.extend(1.0);
-    let (mut w, mut found) = (0.0, 0.0);
-    for _ in 0..iterations {
-        found = depth.inverse_depth(ideal.px_from_point(direction + w * shift));
-        w = depth_on_line(direction, shift, found).unwrap_or(w);
-    }
-    found
+    settle(uv, key_from_line, iterations, depth, ideal).in_key
 }
 
 /// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of [`reproject`].
 #[must_use]
 pub fn reproject_with(uv: DVec2, key_from_line: (DMat3, DVec3), found: f64, ideal: &IdealGeometry) -> Option<Source> {
     let (rotation, shift) = key_from_line;
+    let w = depth_on_line(rotation * uv.extend(1.0), shift, found).unwrap_or(0.0);
+    source_at(uv, key_from_line, w, ideal)
+}
+
+/// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's ray.
+#[derive(Clone, Copy, Default)]
+struct Settled {
+    in_key: f64,
+    on_line: f64,
+}
+
+fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, depth: &InverseDepthImage<'_>, ideal: &IdealGeometry) -> Settled {
+    let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
-    let w = depth_on_line(direction, shift, found).unwrap_or(0.0);
-    let in_key = direction + w * shift;
+    let mut settled = Settled::default();
+    for _ in 0..iterations {
+        let in_key = depth.inverse_depth(ideal.px_from_point(direction + settled.on_line * shift));
+        settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
+    }
+    settled
+}
+
+/// Where the point at inverse depth `w` (1/m) of the line's ray is seen in the key frame.
+fn source_at(uv: DVec2, key_from_line: (DMat3, DVec3), w: f64, ideal: &IdealGeometry) -> Option<Source> {
+    let (rotation, shift) = key_from_line;
+    let in_key = rotation * uv.extend(1.0) + w * shift;
     let at_px = ideal.px_from_point(in_key);
     (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
 }

@@ -84,5 +84,6 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             assert!(plan.predicted.levels_in_the_way.is_some_and(|cause| cause.contains("quality.ideal_scale")));
         }
     }
+    // Of all cases a tenth may be outside: distant ground at grazing angles beyond houses, and a lens's fold, are seen by few of the 32 places.
     assert!(outside.len() * 10 <= if long { 3 * cases().map_or(0, |all| all.len()) } else { 0 }, "{outside:#?}");
 }

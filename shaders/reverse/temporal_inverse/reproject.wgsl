@@ -6,14 +6,25 @@
 #import reverse/temporal_inverse/interface.wgsl
 #import reverse/temporal_inverse/pose_table.wgsl
 
+// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's ray.
+struct Settled {
+    in_key: f32,
+    on_line: f32,
+}
+
+fn settle(direction: vec3<f32>, shift: vec3<f32>) -> Settled {
+    var settled = Settled(0.0, 0.0);
+    for (var i = 0u; i < frame.iterations; i++) {
+        settled.in_key = inverse_depth(ideal_px_from_point(direction + settled.on_line * shift));
+        settled.on_line = depth_on_line(direction, shift, settled.in_key, settled.on_line);
+    }
+    return settled;
+}
+
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let direction = rotate(pose, vec3<f32>(uv, 1.0));
     let shift = translation(pose);
-    var w = 0.0;
-    for (var i = 0u; i < frame.iterations; i++) {
-        w = depth_on_line(direction, shift, inverse_depth(ideal_px_from_point(direction + w * shift)), w);
-    }
-    return source_at(direction, shift, w);
+    return source_at(direction, shift, settle(direction, shift).on_line);
 }
 
 // The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or behind the line's own image plane the
@@ -31,15 +42,7 @@ fn source_at(direction: vec3<f32>, shift: vec3<f32>, w: f32) -> Source {
 
 // The key frame's inverse depth that the last look-up of the temporal inverse finds.
 fn settled_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
-    let direction = rotate(pose, vec3<f32>(uv, 1.0));
-    let shift = translation(pose);
-    var w = 0.0;
-    var found = 0.0;
-    for (var i = 0u; i < frame.iterations; i++) {
-        found = inverse_depth(ideal_px_from_point(direction + w * shift));
-        w = depth_on_line(direction, shift, found, w);
-    }
-    return found;
+    return settle(rotate(pose, vec3<f32>(uv, 1.0)), translation(pose)).in_key;
 }
 
 // Where a surface of this inverse depth in the key frame is seen.

@@ -22,8 +22,8 @@ const FACING_MARGIN: f64 = 0.95;
 const IGNORED_DN: f64 = 16.0;
 /// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4 samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is 0.5/255 over the picture.
 const COARSE_DN: f64 = 1.0;
-/// Colour and depth of 4 samples, and their mean colour.
-pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 12 + 8;
+/// Colour and depth of 4 samples, their mean colour, and the border between them.
+pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 12 + 8 + 8;
 /// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead of 9.
 const MAX_FINE_BYTES: u64 = 512 << 20;
 /// A flat mesh with more corners than this is not looked at any closer.

@@ -162,12 +162,12 @@ impl<'a> Prospect<'a> {
     }
 
     /// What is to be expected of a way of sampling.
-    pub fn expect(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
-        self.expect_at(1, scale, taps, blur)
+    pub fn expected(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
+        self.expected_at(1, scale, taps, blur)
     }
 
     /// The same from one place of `every`.
-    fn expect_at(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
+    fn expected_at(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
         let [exact, sampled] = self.squares(every, scale, taps, blur);
         Expected { resampling_dn: dn(exact), blur_dn: SAFETY * 255.0 * (sampled - exact).max(0.0).sqrt() }
     }
@@ -218,9 +218,9 @@ impl<'a> Prospect<'a> {
             (Sampling { scale, taps, samples_per_px, expected: Expected::default() }, blur)
         };
         // A few places tell what is far from keeping the tolerance.
-        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expect_at(FEW, sampling.scale, sampling.taps, blur).total_dn();
+        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, sampling.scale, sampling.taps, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
-            let expected = self.expect(sampling.scale, sampling.taps, blur);
+            let expected = self.expected(sampling.scale, sampling.taps, blur);
             Sampling { expected, ..sampling }
         };
         let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;

@@ -2,7 +2,10 @@
 
 use serde::Serialize;
 
-use super::{Row, knobs::Family};
+use super::{
+    Row,
+    knobs::{DEFAULT, Family},
+};
 use crate::timing::quantile;
 
 /// Times differ if nine tenths of the rounds say so, by this factor: of three rounds, about all.
@@ -70,9 +73,9 @@ enum Than {
     Worse,
 }
 
-/// The coordinates of `other` than those of `row`, by one figure; alike where it is not known of both.
-fn coords_than(other: &Row, row: &Row, figure: fn(&Row) -> Option<f64>) -> Than {
-    match (figure(other), figure(row)) {
+/// One figure of coordinates than another; alike where one is not known.
+fn coords_than(other: Option<f64>, row: Option<f64>) -> Than {
+    match (other, row) {
         (Some(other), Some(row)) if row > WORSE * other + FLOOR_PX => Than::Better,
         (Some(other), Some(row)) if other > WORSE * row + FLOOR_PX => Than::Worse,
         _ => Than::Alike,
@@ -98,9 +101,12 @@ pub fn violations(rows: &[Row]) -> Vec<Violation> {
         for other in rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob) {
             let ratios = row.times.ratios(&other.times);
             let [least, median] = [1.0 - ROUNDS, 0.5].map(|part| quantile(&ratios, part));
-            let all = coords_than(other, row, |row| row.coord_rms_px);
-            let smooth = coords_than(other, row, |row| row.smooth_p99_px);
-            let than = [all, smooth, picture_than(other, row)];
+            // Samples and taps do not move sources: what was not compared is as in the case's default row.
+            let default = rows.iter().find(|default| comparable(row, default) && default.knob == DEFAULT);
+            let coords = |figure: fn(&Row) -> Option<f64>| {
+                coords_than(figure(other).or_else(|| default.and_then(|default| figure(default))), figure(row))
+            };
+            let than = [coords(|row| row.coord_rms_px), coords(|row| row.smooth_p99_px), picture_than(other, row)];
             if least > SLOWER && than.contains(&Than::Better) && !than.contains(&Than::Worse) {
                 found.push(Violation {
                     case: row.case.clone(),
@@ -152,6 +158,10 @@ mod tests {
         // Fewer samples for a better picture, coordinates not looked at; and the same plan under another name.
         let sharper = Row { coord_rms_px: None, ..row("sharper", Family::Blur, [10.0, 11.0, 10.0], 0.0, 45.5) };
         assert_eq!(names(&[auto.clone(), sharper.clone()]), ["sharper"]);
+        // Its coordinates are then those of the default row: worse than those of a row that was asked to be exact.
+        let default = Row { coord_rms_px: Some(0.05), ..row(DEFAULT, Family::Tolerance, [9.0; 3], 0.05, 45.0) };
+        let exact = row("exact", Family::Tolerance, [20.0, 22.0, 21.0], 1e-4, 45.0);
+        assert!(names(&[default, exact, sharper.clone()]).is_empty());
         let smoother = Row { smooth_p99_px: Some(1e-4), ..row("smoother", Family::Solver, [10.0, 11.0, 10.0], 0.05, 45.0) };
         assert_eq!(names(&[Row { smooth_p99_px: Some(2e-3), ..auto.clone() }, smoother]), ["smoother"]);
         // From 55 dB on pictures are alike.
