@@ -11,7 +11,7 @@ use camsim_core::{
 };
 use camsim_gpu::{
     Engine,
-    engine::{Finished, Session},
+    engine::{Finished, FrameTimes, Session},
 };
 use camsim_io::write::WriteError;
 
@@ -44,6 +44,11 @@ impl<'a> Device<'a> {
     pub fn new(engine: &'a Engine, sequence: &Arc<Sequence>) -> Result<Self, Failure> {
         let session = engine.session::<WriteError>(sequence.clone(), &sequence.scenario.output.channels)?;
         Ok(Self { engine, session })
+    }
+
+    /// From now on finished frames tell the time of their passes, if the adapter can.
+    pub fn time_passes(&mut self) {
+        self.session.time_passes();
     }
 }
 
@@ -105,7 +110,7 @@ impl FrameSource for Rays {
             let plan = self.planner.plan(frame).or_bad_input()?;
             let options = RenderOptions { key: Some(KeyFrame { pose: plan.key_pose, ideal: plan.ideal }), ..self.options.clone() };
             let frame = self.oracle.render(frame, &options);
-            sink(Finished { frame, plan, lod: LodSelection::default() }).or_failed()?;
+            sink(Finished { frame, plan, lod: LodSelection::default(), times: FrameTimes::default() }).or_failed()?;
         }
         Ok(())
     }

@@ -21,6 +21,7 @@ mod inputs;
 mod output;
 mod progress;
 mod render_run;
+mod times_table;
 
 use console::Console;
 use failure::Failure;

@@ -139,7 +139,8 @@ impl GpuContext {
         let summary = AdapterSummary::of(&adapter.get_info());
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("camsim"),
-            required_features: wgpu::Features::empty(),
+            // Only for measuring; nothing else depends on it.
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             experimental_features: wgpu::ExperimentalFeatures::disabled(),
             memory_hints: wgpu::MemoryHints::Performance,

@@ -3,6 +3,7 @@
 use std::{
     collections::HashMap,
     sync::{Arc, Mutex},
+    time::Instant,
 };
 
 use camsim_core::{
@@ -22,6 +23,7 @@ use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
     ideal::{IdealPass, IdealSlot, IdealTarget, STORED_FORMAT},
     layout::{FrameUniforms, Truth},
+    recorder::{PassClock, PassTime, Recorder},
     reverse::{PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
     shaders::ComposeError,
     upload::SceneBuffers,
@@ -29,7 +31,7 @@ use crate::{
 
 mod readback;
 
-use readback::{Output, coords, read_texture};
+use readback::{Output, coords, read_mapped, read_texture};
 
 /// Frames that the device works on while the host reads an older one.
 const FRAMES_IN_FLIGHT: usize = 2;
@@ -194,6 +196,7 @@ struct Slot {
     poses: wgpu::Buffer,
     color: Output,
     truth: Option<Output>,
+    clock: Option<PassClock>,
 }
 
 /// A submitted frame.
@@ -202,10 +205,26 @@ struct InFlight {
     plan: FramePlan,
     submission: wgpu::SubmissionIndex,
     lod: LodSelection,
+    times: FrameTimes,
 }
 
 /// Geometry, linear R G B A (A is 0 where a silhouette is marked), and inverse depth in 1/m of an ideal frame, row-major.
 pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
+
+/// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameTimes {
+    /// The host planned it.
+    pub plan_ms: f64,
+    /// The host wrote its tables and recorded its passes.
+    pub record_ms: f64,
+    /// The host waited for the device.
+    pub wait_ms: f64,
+    /// The host took the pictures.
+    pub read_ms: f64,
+    /// What ran on the device, if asked for ([`Session::time_passes`]) and if the adapter has time stamps.
+    pub passes: Vec<PassTime>,
+}
 
 /// A finished frame with the plan it was made by.
 #[derive(Debug)]
@@ -216,6 +235,8 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
+    /// Where its time went.
+    pub times: FrameTimes,
 }
 
 impl Slot {
@@ -233,6 +254,7 @@ impl Slot {
             poses: pose_buffer(gpu, 48 * width.max(height)),
             color: Output::new(gpu, "camsim.color", 16 * width * height),
             truth: truth.then(|| Output::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)),
+            clock: None,
         }
     }
 }
@@ -259,6 +281,14 @@ impl Session<'_> {
         self.coords_phase = phase;
     }
 
+    /// From now on measures how long each pass takes on the device; `false` where the adapter has no time stamps.
+    pub fn time_passes(&mut self) -> bool {
+        for slot in &mut self.slots {
+            slot.clock = PassClock::new(&self.engine.gpu);
+        }
+        self.slots.iter().all(|slot| slot.clock.is_some())
+    }
+
     /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next.
     ///
     /// # Errors
@@ -271,8 +301,11 @@ impl Session<'_> {
         let mut waiting: Option<InFlight> = None;
         let mut slot = 0;
         for frame in frames {
+            let begun = Instant::now();
             let plan = self.planner.plan(frame)?;
-            let submitted = self.submit(plan, slot).map_err(RenderError::lift)?;
+            let plan_ms = ms_since(begun);
+            let mut submitted = self.submit(plan, slot).map_err(RenderError::lift)?;
+            submitted.times.plan_ms = plan_ms;
             slot = (slot + 1) % FRAMES_IN_FLIGHT;
             if let Some(done) = waiting.replace(submitted) {
                 let finished = self.finish(done)?;
@@ -311,29 +344,34 @@ impl Session<'_> {
     /// Every pass of a frame, in order.
     fn submit(&mut self, plan: FramePlan, slot: usize) -> Result<InFlight, RenderErrorBase> {
         let gpu = &self.engine.gpu;
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") });
+        let begun = Instant::now();
+        let mut clock = self.slots[slot].clock.take();
+        let mut recorder = Recorder::new(&gpu.device, clock.as_mut());
         if plan.ray == RayStage::LensMap {
-            self.lens_inverse(&mut encoder, &plan);
+            self.lens_inverse(&mut recorder, &plan);
         }
-        self.ideal(&mut encoder, &plan, slot);
-        self.reverse(&mut encoder, &plan, slot)?;
-        let slot_buffers = &self.slots[slot];
-        slot_buffers.color.copy(&mut encoder);
+        self.ideal(&mut recorder, &plan, slot);
+        self.reverse(&mut recorder, &plan, slot)?;
+        let slot_buffers = &mut self.slots[slot];
+        slot_buffers.color.copy(recorder.encoder());
         if let Some(truth) = &slot_buffers.truth {
-            truth.copy(&mut encoder);
+            truth.copy(recorder.encoder());
         }
-        let submission = gpu.queue.submit([encoder.finish()]);
-        for output in [Some(&slot_buffers.color), slot_buffers.truth.as_ref()].into_iter().flatten() {
+        let submission = gpu.queue.submit([recorder.finish()]);
+        slot_buffers.clock = clock;
+        let outputs = [Some(&slot_buffers.color), slot_buffers.truth.as_ref()].into_iter().flatten().map(|output| &output.on_host);
+        for on_host in outputs.chain(slot_buffers.clock.as_ref().map(PassClock::on_host)) {
             // A failed mapping shows when the range is read.
-            output.on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+            on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
         }
         self.engine.check()?;
         let lod = self.drawn.as_ref().map(|drawn| drawn.lod.clone()).unwrap_or_default();
-        Ok(InFlight { slot, plan, submission, lod })
+        let times = FrameTimes { record_ms: ms_since(begun), ..FrameTimes::default() };
+        Ok(InFlight { slot, plan, submission, lod, times })
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
-    fn lens_inverse(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan) {
+    fn lens_inverse(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan) {
         let gpu = &self.engine.gpu;
         let bits = plan.zoom.unwrap_or_default().to_bits();
         if self.lens_map.as_ref().is_some_and(|(of, _)| *of == bits) {
@@ -346,7 +384,7 @@ impl Session<'_> {
             let entry = table.nearest(zoom);
             if let (false, Ok(camera)) = (self.zoom_maps.contains_key(&entry), table.at(table.entries()[entry].at)) {
                 let map = LensInversePass::create_map(&gpu.device, camera.size_px);
-                pass.encode(&gpu.device, encoder, &camera, &view(&map), None);
+                pass.encode(&gpu.device, recorder, &camera, &view(&map), None);
                 self.zoom_maps.insert(entry, map);
             }
             warm = self.zoom_maps.get(&entry).map(view);
@@ -355,12 +393,12 @@ impl Session<'_> {
             Some((_, map)) => map,
             None => LensInversePass::create_map(&gpu.device, plan.camera.size_px),
         };
-        pass.encode(&gpu.device, encoder, &plan.camera, &view(&map), warm.as_ref());
+        pass.encode(&gpu.device, recorder, &plan.camera, &view(&map), warm.as_ref());
         self.lens_map = Some((bits, map));
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    fn ideal(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) {
+    fn ideal(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) {
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
             drawn.poses == poses
@@ -391,7 +429,7 @@ impl Session<'_> {
         }
         let lod = self.ideal_pass.encode(
             gpu,
-            encoder,
+            recorder,
             ideal_slots,
             &sequence.scene,
             &self.buffers,
@@ -403,7 +441,7 @@ impl Session<'_> {
     }
 
     /// Pass 3: the output frame.
-    fn reverse(&mut self, encoder: &mut wgpu::CommandEncoder, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
+    fn reverse(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
         let gpu = &self.engine.gpu;
         let sequence = self.planner.sequence();
         let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
@@ -439,15 +477,19 @@ impl Session<'_> {
             out_color: &slot.color.on_device,
             out_truth: slot.truth.as_ref().map(|truth| &truth.on_device),
         };
-        self.reverse_pass.encode(gpu, encoder, PipelineKey::of(plan), plan.camera.size_px, &bindings)
+        self.reverse_pass.encode(gpu, recorder, PipelineKey::of(plan), plan.camera.size_px, &bindings)
     }
 
     /// Waits for a frame and takes its pictures.
     fn finish(&self, done: InFlight) -> Result<Finished, GpuError> {
         let gpu = &self.engine.gpu;
         let wait = wgpu::PollType::Wait { submission_index: Some(done.submission), timeout: None };
+        let mut times = done.times;
+        let begun = Instant::now();
         gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
         self.engine.check()?;
+        times.wait_ms = ms_since(begun);
+        let begun = Instant::now();
         let slot = &self.slots[done.slot];
         let color_rgba = slot.color.read()?;
         let truth = slot.truth.as_ref().map(Output::read::<Truth>).transpose()?;
@@ -462,8 +504,16 @@ impl Session<'_> {
             coords: truth.as_ref().map(|truth| coords(truth, &plan)),
             rows: self.planner.rows(&plan),
         };
-        Ok(Finished { frame, plan, lod: done.lod })
+        times.read_ms = ms_since(begun);
+        if let Some(clock) = &slot.clock {
+            times.passes = clock.passes(gpu, &read_mapped(clock.on_host())?);
+        }
+        Ok(Finished { frame, plan, lod: done.lod, times })
     }
+}
+
+fn ms_since(begun: Instant) -> f64 {
+    begun.elapsed().as_secs_f64() * 1e3
 }
 
 /// Errors before a sink is involved.

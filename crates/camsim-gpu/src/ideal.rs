@@ -12,6 +12,7 @@ use glam::{DMat3, DVec3};
 use crate::{
     context::GpuContext,
     layout::{ChunkDraw, IdealCamera},
+    recorder::Recorder,
     shaders::{self, ComposeError},
     upload::SceneBuffers,
 };
@@ -214,7 +215,7 @@ impl IdealPass {
     pub fn encode(
         &self,
         gpu: &GpuContext,
-        encoder: &mut wgpu::CommandEncoder,
+        recorder: &mut Recorder<'_>,
         slots: &[IdealSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
@@ -228,24 +229,21 @@ impl IdealPass {
             Some(fine) => (view(&fine.color), fine.depth_view(), Some(view(&fine.averaged)), fine.scale, &self.fine),
         };
         let [r, g, b] = scene.sky_linear.map(f64::from);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("ideal"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+        let mut pass = recorder.render_pass(
+            "ideal",
+            wgpu::RenderPassColorAttachment {
                 view: &color_view,
                 depth_slice: None,
                 resolve_target: resolved_view.as_ref(),
                 ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            },
+            wgpu::RenderPassDepthStencilAttachment {
                 view: &depth_view,
                 // Reversed: 0 is infinitely far.
                 depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
                 stencil_ops: None,
-            }),
-            timestamp_writes: None,
-            occlusion_query_set: None,
-            multiview_mask: None,
-        });
+            },
+        );
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
         let focal_px = plan.ideal.focal_px.max_element();
         let mut middle_lod = LodSelection::default();
@@ -267,7 +265,7 @@ impl IdealPass {
         }
         drop(pass);
         if let Some(fine) = &target.fine {
-            self.resolve.encode(gpu, encoder, plan, target, fine);
+            self.resolve.encode(gpu, recorder, plan, target, fine);
         }
         middle_lod
     }

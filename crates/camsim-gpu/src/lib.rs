@@ -14,6 +14,8 @@ pub mod layout;
 
 pub mod upload;
 
+pub mod recorder;
+
 pub mod ideal;
 
 pub mod reverse;

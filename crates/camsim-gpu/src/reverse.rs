@@ -18,6 +18,7 @@ use crate::{
     context::GpuContext,
     ideal::{FineTarget, key_rows},
     layout::FrameUniforms,
+    recorder::Recorder,
     shaders::{self, ComposeError, Slot},
 };
 
@@ -266,7 +267,7 @@ impl ReversePass {
     pub fn encode(
         &mut self,
         gpu: &GpuContext,
-        encoder: &mut wgpu::CommandEncoder,
+        recorder: &mut Recorder<'_>,
         key: PipelineKey,
         size_px: [u32; 2],
         bindings: &ReverseBindings<'_>,
@@ -276,7 +277,7 @@ impl ReversePass {
             Entry::Vacant(first_use) => first_use.insert(Variant::new(gpu, key)?),
         };
         let groups = variant.bind(gpu, &self.sampler, bindings);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("reverse"), timestamp_writes: None });
+        let mut pass = recorder.compute_pass("reverse");
         pass.set_pipeline(&variant.pipeline);
         for (i, group) in groups.iter().enumerate() {
             if let Some(group) = group {

@@ -3,7 +3,7 @@
 
 use camsim_core::camera::{CameraModel, INVALID_UV};
 use camsim_core::lens::{Lens, LensModel};
-use camsim_gpu::reverse::lens_inverse::LensInversePass;
+use camsim_gpu::{recorder::Recorder, reverse::lens_inverse::LensInversePass};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -43,8 +43,8 @@ impl Gpu {
         let texture = LensInversePass::create_map(&self.device, camera.size_px);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let warm = warm.map(|map| map.create_view(&wgpu::TextureViewDescriptor::default()));
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.pass.encode(&self.device, &mut encoder, camera, &view, warm.as_ref());
+        let mut recorder = Recorder::new(&self.device, None);
+        self.pass.encode(&self.device, &mut recorder, camera, &view, warm.as_ref());
         let row_bytes = (width * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
@@ -52,7 +52,7 @@ impl Gpu {
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        encoder.copy_texture_to_buffer(
+        recorder.encoder().copy_texture_to_buffer(
             texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
@@ -60,7 +60,7 @@ impl Gpu {
             },
             texture.size(),
         );
-        self.queue.submit([encoder.finish()]);
+        self.queue.submit([recorder.finish()]);
         buffer.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         let bytes = buffer.get_mapped_range(..).unwrap();

@@ -15,6 +15,7 @@ use crate::{
     frame_source::{Device, FrameSource, Rays},
     inputs::{self, Changes, ScenarioArgs},
     render_run::{self, Job},
+    times_table::TimesTable,
 };
 
 /// Render the frames of a scenario
@@ -31,6 +32,8 @@ Examples:
   camsim render flight.toml -o out --resume           only what is missing
   camsim render flight.toml --backend reference --frames 7
                                                       exactly and slowly, without a graphics adapter
+  camsim render flight.toml --format none --frames 0..50 --times
+                                                      how fast, and where the time goes
   camsim render --print-default > flight.toml         a scenario to begin with")]
 pub struct Args {
     /// Scenario (TOML)
@@ -56,6 +59,9 @@ pub struct Args {
     /// Keep frames that are there already; refused if the folder is of another scenario
     #[arg(long)]
     resume: bool,
+    /// Say at the end where the time went: on the host, and pass by pass on the device
+    #[arg(long)]
+    times: bool,
     /// Render the I-th of N parts only, I from 1
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
@@ -119,10 +125,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         Box::new(Rays::new(&loaded.sequence)?)
     } else {
         engine = Engine::new(AdapterChoice::Best)?;
-        Box::new(Device::new(&engine, &loaded.sequence)?)
+        let mut device = Device::new(&engine, &loaded.sequence)?;
+        if args.times {
+            device.time_passes();
+        }
+        Box::new(device)
     };
+    let mut times = TimesTable::default();
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let outcome = render_run::run(&job, &mut *source, console, &mut |_| {}).inspect_err(|failure| {
+    let outcome = render_run::run(&job, &mut *source, console, &mut |finished| times.add(&finished.times)).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
             console.note("frames that are written stay as they are: --resume goes on with the others");
         }
@@ -133,6 +144,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         let size_mb = outcome.bytes as f64 * 1e-6;
         let (frames, folder) = (outcome.frames, folder.display());
         console.line(format_args!("{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"))?;
+    }
+    if args.times {
+        console.print(&times.text())?;
     }
     Ok(())
 }

@@ -29,12 +29,17 @@ impl Output {
     }
 
     pub fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
-        let view = self.on_host.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
-        let values = bytemuck::pod_collect_to_vec(&view);
-        drop(view);
-        self.on_host.unmap();
-        Ok(values)
+        read_mapped(&self.on_host)
     }
+}
+
+/// Takes the values of a buffer that has been asked to be mapped, and unmaps it.
+pub(super) fn read_mapped<T: bytemuck::Pod>(buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+    let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
+    let values = bytemuck::pod_collect_to_vec(&view);
+    drop(view);
+    buffer.unmap();
+    Ok(values)
 }
 
 /// What the shader wrote beside the picture, with each pixel's time shift.

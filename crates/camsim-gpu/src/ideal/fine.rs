@@ -5,6 +5,7 @@ use camsim_core::plan::{EdgeStage, FramePlan};
 use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW, key_rows};
 use crate::{
     context::GpuContext,
+    recorder::Recorder,
     shaders::{self, ComposeError},
 };
 
@@ -142,14 +143,7 @@ impl ResolvePass {
     }
 
     /// Records the resolve of a plan's ideal frames.
-    pub(super) fn encode(
-        &self,
-        gpu: &GpuContext,
-        encoder: &mut wgpu::CommandEncoder,
-        plan: &FramePlan,
-        target: &IdealTarget,
-        fine: &FineTarget,
-    ) {
+    pub(super) fn encode(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, target: &IdealTarget, fine: &FineTarget) {
         let (rows, last) = (key_rows(&plan.ideal), plan.keys.len() as u32 - 1);
         let size_px = [plan.ideal.size_px[0], rows * last + plan.ideal.size_px[1]];
         let layout = [plan.ideal.size_px[0], plan.ideal.size_px[1], rows, 0];
@@ -171,8 +165,8 @@ impl ResolvePass {
                 entry(6, wgpu::BindingResource::TextureView(&lines)),
             ],
         });
-        encoder.clear_buffer(&fine.nearest, 0, None);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("resolve"), timestamp_writes: None });
+        recorder.encoder().clear_buffer(&fine.nearest, 0, None);
+        let mut pass = recorder.compute_pass("resolve");
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);

@@ -10,6 +10,8 @@ use camsim_core::lens::{Lens, LensModel};
 use glam::DVec2;
 use wgpu::util::DeviceExt;
 
+use crate::recorder::Recorder;
+
 /// Texel format of a lens map. Half precision would cost 0.3 px.
 pub const LENS_MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
 
@@ -170,7 +172,7 @@ impl LensInversePass {
     pub fn encode(
         &self,
         device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
+        recorder: &mut Recorder<'_>,
         camera: &CameraModel,
         target: &wgpu::TextureView,
         warm: Option<&wgpu::TextureView>,
@@ -206,7 +208,7 @@ impl LensInversePass {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("lens_inverse"), timestamp_writes: None });
+        let mut pass = recorder.compute_pass("lens_inverse");
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &bind_group, &[]);
         let [width, height] = camera.size_px;

@@ -1,0 +1,47 @@
+//! `camsim render --times`: where the time of the frames went.
+
+use camsim_gpu::engine::FrameTimes;
+
+/// Milliseconds of each part, one entry a frame, in the order in which frames meet the parts.
+#[derive(Debug, Default)]
+pub struct TimesTable {
+    parts: Vec<(String, Vec<f64>)>,
+    frames: usize,
+}
+
+impl TimesTable {
+    /// Takes in a frame.
+    pub fn add(&mut self, times: &FrameTimes) {
+        self.frames += 1;
+        for (name, ms) in
+            [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: wait", times.wait_ms), ("host: read", times.read_ms)]
+        {
+            self.part(name.to_owned(), ms);
+        }
+        for pass in &times.passes {
+            self.part(format!("device: {}", pass.name), pass.ms);
+        }
+    }
+
+    fn part(&mut self, name: String, ms: f64) {
+        match self.parts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, all)) => all.push(ms),
+            None => self.parts.push((name, vec![ms])),
+        }
+    }
+
+    /// Median and largest of each part, and in how many frames there was one: what is kept from frame to frame is not done again.
+    #[must_use]
+    pub fn text(&mut self) -> String {
+        let mut text = format!("{:<24}{:>10}{:>10}{:>10}\n", "ms a frame", "median", "largest", "frames");
+        for (name, all) in &mut self.parts {
+            all.sort_by(f64::total_cmp);
+            let (median, largest) = (all[all.len() / 2], all[all.len() - 1]);
+            text += &format!("  {name:<22}{median:>10.2}{largest:>10.2}{:>10}\n", all.len());
+        }
+        if self.parts.iter().all(|(name, _)| name.starts_with("host")) {
+            text += "  the adapter has no time stamps\n";
+        }
+        text
+    }
+}
