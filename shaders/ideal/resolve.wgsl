@@ -1,15 +1,15 @@
-// From the samples of a supersampled ideal frame to one colour and depth a pixel, as the plain gather reads them; alpha is 0 where a
+// From the depth samples of an ideal frame to one depth a pixel, as the plain gather reads it; colour stays, but its alpha is 0 where a
 // pixel and its neighbours show more than one surface. Twin of `steps`: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
 #import ideal/lines.wgsl
 
 @group(0) @binding(0) var fine_depth: texture_depth_multisampled_2d;
-// Fine pixels, their 4 samples averaged by the hardware.
-@group(0) @binding(1) var fine_color: texture_2d<f32>;
+// Colour at the middle of each pixel.
+@group(0) @binding(1) var centre_color: texture_2d<f32>;
 @group(0) @binding(2) var color: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(3) var depth: texture_storage_2d<r32float, write>;
-// Bits of the largest depth value of the frame: positive floats are ordered as their bits are.
-@group(0) @binding(4) var<storage, read_write> nearest: atomic<u32>;
+// A word for each 8x8 pixels of the target, as ideal/reach.wgsl reads it.
+@group(0) @binding(4) var<storage, read_write> tiles: array<u32>;
 // Ideal pixels of a frame, and rows from one to the next; w is not used.
 @group(0) @binding(5) var<uniform> ideal_layout: vec4<u32>;
 // Borders of surfaces within fine pixels.
@@ -57,16 +57,6 @@ fn pixel_spread(pixel: vec2<i32>, scale: i32, at_least: f32) -> Spread {
     return found;
 }
 
-fn pixel_color(pixel: vec2<i32>, scale: i32) -> vec3<f32> {
-    var sum = vec3<f32>(0.0);
-    for (var y = 0; y < scale; y++) {
-        for (var x = 0; x < scale; x++) {
-            sum += textureLoad(fine_color, pixel * scale + vec2<i32>(x, y), 0).rgb;
-        }
-    }
-    return sum / f32(scale * scale);
-}
-
 // Along one direction: a second difference beyond what a smooth surface has, or sky beside a surface.
 fn steps(before: f32, here: f32, after: f32, edge_step: f32) -> bool {
     let high = max(before, max(here, after));
@@ -77,7 +67,7 @@ fn steps(before: f32, here: f32, after: f32, edge_step: f32) -> bool {
 @compute @workgroup_size(8, 8)
 fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>, @builtin(local_invocation_index) index: u32) {
     let size = vec2<i32>(textureDimensions(color));
-    let scale = i32(textureDimensions(fine_color).x) / size.x;
+    let scale = i32(textureDimensions(fine_depth).x) / size.x;
     let first = vec2<i32>(group.xy) * 8 - 1;
     for (var i = i32(index); i < 100; i += 64) {
         let at = clamp(first + vec2<i32>(i % 10, i / 10), vec2<i32>(0), size - 1);
@@ -103,7 +93,7 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
         if (edge && spread.low < (1.0 - ONE_SURFACE) * spread.high) {
             surface = pixel_spread(pixel, scale, 0.5 * (spread.low + spread.high)).mean;
         }
-        textureStore(color, pixel, vec4<f32>(pixel_color(pixel, scale), select(1.0, 0.0, edge)));
+        textureStore(color, pixel, vec4<f32>(textureLoad(centre_color, pixel, 0).rgb, select(1.0, 0.0, edge)));
         textureStore(depth, pixel, vec4<f32>(surface));
         for (var i = 0; i < scale * scale; i++) {
             textureStore(lines, pixel * scale + vec2<i32>(i % scale, i / scale), vec4<u32>(0u));
@@ -125,6 +115,7 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
         textureStore(lines, fine_pixel, vec4<u32>(edge_line(fine_pixel, from_px, to_px), 0u, 0u));
     }
     if (index == 0u) {
-        atomicMax(&nearest, atomicLoad(&group_nearest));
+        let across = u32(size.x + 7) / 8u;
+        tiles[group.y * across + group.x] = (atomicLoad(&group_nearest) & 0xfffffffeu) | u32(atomicLoad(&marked_count) > 0u);
     }
 }

@@ -15,23 +15,33 @@
 #import <slot:emit>
 
 @compute @workgroup_size(8, 8)
-fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
+fn reverse(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let pixel = id.xy;
-    if (pixel.x >= frame.size_px.x || pixel.y >= frame.size_px.y) {
-        return;
-    }
-    let ray = lens_ray(pixel);
-    if (!ray.valid) {
-        emit_invalid(pixel);
-        return;
-    }
-    let weight = vignette_weight(pixel);
+    let in_picture = all(pixel < frame.size_px);
+    var ray = Ray();
     var gathered = Gathered(vec4<f32>(0.0), true);
-    use_key_of_line(pixel);
-    if (weight > 0.0) {
-        gathered = gather_edges(pixel, ray, gather(pixel, ray));
+    var weight = 0.0;
+    var needed = false;
+    if (in_picture) {
+        ray = lens_ray(pixel);
+        if (ray.valid) {
+            weight = vignette_weight(pixel);
+        }
+        if (weight > 0.0) {
+            use_key_of_line(pixel);
+            gathered = gather(pixel, ray);
+            needed = needs_rays(pixel, ray, gathered);
+        }
     }
-    if (!gathered.inside) {
+    // By all threads together.
+    let seen = cast_rays(thread, pixel, ray, needed);
+    if (!in_picture) {
+        return;
+    }
+    if (needed) {
+        gathered.color = vec4<f32>(seen, 1.0);
+    }
+    if (!ray.valid || !gathered.inside) {
         emit_invalid(pixel);
         return;
     }

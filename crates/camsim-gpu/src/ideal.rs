@@ -108,6 +108,7 @@ pub struct IdealPass {
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
     plain: SurfacePipelines,
+    /// Depth alone, for supersampled frames.
     fine: SurfacePipelines,
 }
 
@@ -154,13 +155,13 @@ impl IdealPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
         };
-        let pipelines = |samples, format| -> Result<_, ComposeError> {
+        let pipelines = |samples, format: Option<wgpu::TextureFormat>| -> Result<_, ComposeError> {
             Ok(SurfacePipelines {
                 terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples, format)?,
                 mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples, format)?,
             })
         };
-        let (plain, fine) = (pipelines(1, color_format(preset))?, pipelines(FINE_SAMPLES, COLOR_FORMAT)?);
+        let (plain, fine) = (pipelines(1, Some(color_format(preset)))?, pipelines(FINE_SAMPLES, None)?);
         Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
     }
 
@@ -224,124 +225,162 @@ impl IdealPass {
         target: &IdealTarget,
     ) -> LodSelection {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (color_view, depth_view, resolved_view, scale, pipelines) = match &target.fine {
-            None => (view(&target.color), view(&target.depth), None, 1, &self.plain),
-            Some(fine) => (view(&fine.color), fine.depth_view(), Some(view(&fine.averaged)), fine.scale, &self.fine),
-        };
+        let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
         let [r, g, b] = scene.sky_linear.map(f64::from);
-        let mut pass = recorder.render_pass(
-            "ideal",
-            wgpu::RenderPassColorAttachment {
-                view: &color_view,
-                depth_slice: None,
-                resolve_target: resolved_view.as_ref(),
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
-            },
-            wgpu::RenderPassDepthStencilAttachment {
-                view: &depth_view,
-                // Reversed: 0 is infinitely far.
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
-                stencil_ops: None,
-            },
-        );
-        let [width, height] = plan.ideal.size_px.map(|side| side * scale);
-        let focal_px = plan.ideal.focal_px.max_element();
+        let (color_view, depth_view) = (view(color), view(depth));
+        let color = wgpu::RenderPassColorAttachment {
+            view: &color_view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
+        };
         let mut middle_lod = LodSelection::default();
+        let mut draws = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
             gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
-            let first_row = key_rows(&plan.ideal) * k as u32 * scale;
-            pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
-            pass.set_scissor_rect(0, first_row, width, height);
-            pass.set_bind_group(0, &slot.camera_group, &[]);
+            let focal_px = plan.ideal.focal_px.max_element();
             let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
                 select_lod(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px)
             });
-            self.draw_terrain(gpu, &mut pass, pipelines, slot, scene, buffers, &lod, base_ned_m);
-            self.draw_meshes(gpu, &mut pass, pipelines, slot, buffers, base_ned_m);
+            place_meshes(gpu, slot, buffers, base_ned_m);
+            draws.push((slot, place_terrain(gpu, slot, scene, buffers, &lod, base_ned_m)));
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
         }
+        let mut pass = recorder.render_pass("ideal", Some(color), depth_attachment(&depth_view));
+        self.draw_keys(&mut pass, &self.plain, plan, 1, buffers, &draws);
         drop(pass);
         if let Some(fine) = &target.fine {
+            let depth_view = fine.depth_view();
+            let mut pass = recorder.render_pass("ideal_fine", None, depth_attachment(&depth_view));
+            self.draw_keys(&mut pass, &self.fine, plan, fine.scale, buffers, &draws);
+            drop(pass);
             self.resolve.encode(gpu, recorder, plan, target, fine);
         }
         middle_lod
     }
 
-    fn draw_terrain(
+    /// Draws each key's surfaces, one key below the other.
+    fn draw_keys(
         &self,
-        gpu: &GpuContext,
         pass: &mut wgpu::RenderPass<'_>,
         pipelines: &SurfacePipelines,
-        slot: &IdealSlot,
-        scene: &Scene,
+        plan: &FramePlan,
+        scale: u32,
         buffers: &SceneBuffers,
-        lod: &LodSelection,
-        base_ned_m: DVec3,
+        keys: &[(&IdealSlot, Vec<TerrainDraw>)],
     ) {
-        let (Some(terrain), Some(on_device), Some(group)) = (&scene.terrain, &buffers.terrain, &slot.terrain_group) else { return };
-        // Chunks of one level are drawn together; those with voids come last, one by one.
-        let mut order: Vec<_> = lod.draws.iter().collect();
-        order.sort_by_key(|draw| (terrain.chunks[draw.chunk as usize].void_indices.is_some(), draw.level, draw.chunk));
-        let rows: Vec<ChunkDraw> = order
-            .iter()
-            .map(|draw| {
-                let chunk = &terrain.chunks[draw.chunk as usize];
-                let [north, east, south, west] = draw.edge_levels.map(u32::from);
-                ChunkDraw {
-                    centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(),
-                    first_vertex: chunk.first_vertex,
-                    cells: chunk.cells,
-                    levels: u32::from(draw.level) | north << 4 | east << 8 | south << 12 | west << 16,
-                    pad: 0,
-                }
-            })
-            .collect();
-        gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
-        pass.set_pipeline(&pipelines.terrain);
-        pass.set_bind_group(1, group, &[]);
-        pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
-        let mut first = 0;
-        while let Some(draw) = order.get(first) {
-            let chunk = &terrain.chunks[draw.chunk as usize];
-            let (range, last) = match &chunk.void_indices {
-                Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
-                None => {
-                    let same = |d: &&camsim_core::scene::ChunkDraw| {
-                        d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none()
-                    };
-                    let count = order[first..].iter().take_while(|d| same(d)).count();
-                    (on_device.levels[draw.level as usize].clone(), first + count)
-                }
-            };
-            pass.draw_indexed(range, 0, first as u32..last as u32);
-            first = last;
+        let [width, height] = plan.ideal.size_px.map(|side| side * scale);
+        for ((slot, terrain), k) in keys.iter().zip(0..) {
+            let first_row = key_rows(&plan.ideal) * k * scale;
+            pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
+            pass.set_scissor_rect(0, first_row, width, height);
+            pass.set_bind_group(0, &slot.camera_group, &[]);
+            draw_terrain(pass, pipelines, slot, buffers, terrain);
+            draw_meshes(pass, pipelines, slot, buffers);
         }
     }
+}
 
-    fn draw_meshes(
-        &self,
-        gpu: &GpuContext,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &SurfacePipelines,
-        slot: &IdealSlot,
-        buffers: &SceneBuffers,
-        base_ned_m: DVec3,
-    ) {
-        if buffers.meshes.is_empty() {
-            return;
-        }
-        pass.set_pipeline(&pipelines.mesh);
-        for ((mesh, group), i) in buffers.meshes.iter().zip(&slot.mesh_groups).zip(0_u64..) {
-            let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
-            gpu.queue.write_buffer(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
-            pass.set_bind_group(1, group, &[]);
-            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
-            pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..mesh.count, 0, 0..1);
-        }
+/// Triangles of terrain chunks that are drawn together.
+#[derive(Debug)]
+struct TerrainDraw {
+    indices: std::ops::Range<u32>,
+    instances: std::ops::Range<u32>,
+}
+
+/// Writes where the chunks of a key stand and how fine they are.
+fn place_terrain(
+    gpu: &GpuContext,
+    slot: &IdealSlot,
+    scene: &Scene,
+    buffers: &SceneBuffers,
+    lod: &LodSelection,
+    base_ned_m: DVec3,
+) -> Vec<TerrainDraw> {
+    let (Some(terrain), Some(on_device)) = (&scene.terrain, &buffers.terrain) else { return Vec::new() };
+    // Chunks of one level are drawn together; those with voids come last, one by one.
+    let mut order: Vec<_> = lod.draws.iter().collect();
+    order.sort_by_key(|draw| (terrain.chunks[draw.chunk as usize].void_indices.is_some(), draw.level, draw.chunk));
+    let rows: Vec<ChunkDraw> = order
+        .iter()
+        .map(|draw| {
+            let chunk = &terrain.chunks[draw.chunk as usize];
+            let [north, east, south, west] = draw.edge_levels.map(u32::from);
+            ChunkDraw {
+                centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(),
+                first_vertex: chunk.first_vertex,
+                cells: chunk.cells,
+                levels: u32::from(draw.level) | north << 4 | east << 8 | south << 12 | west << 16,
+                pad: 0,
+            }
+        })
+        .collect();
+    gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
+    let mut draws = Vec::new();
+    let mut first = 0;
+    while let Some(draw) = order.get(first) {
+        let chunk = &terrain.chunks[draw.chunk as usize];
+        let (indices, last) = match &chunk.void_indices {
+            Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
+            None => {
+                let same =
+                    |d: &&camsim_core::scene::ChunkDraw| d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none();
+                let count = order[first..].iter().take_while(|d| same(d)).count();
+                (on_device.levels[draw.level as usize].clone(), first + count)
+            }
+        };
+        draws.push(TerrainDraw { indices, instances: first as u32..last as u32 });
+        first = last;
+    }
+    draws
+}
+
+fn draw_terrain(
+    pass: &mut wgpu::RenderPass<'_>,
+    pipelines: &SurfacePipelines,
+    slot: &IdealSlot,
+    buffers: &SceneBuffers,
+    draws: &[TerrainDraw],
+) {
+    let (Some(on_device), Some(group)) = (&buffers.terrain, &slot.terrain_group) else { return };
+    pass.set_pipeline(&pipelines.terrain);
+    pass.set_bind_group(1, group, &[]);
+    pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
+    for draw in draws {
+        pass.draw_indexed(draw.indices.clone(), 0, draw.instances.clone());
+    }
+}
+
+/// Writes where the meshes stand from a key.
+fn place_meshes(gpu: &GpuContext, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
+    for (mesh, i) in buffers.meshes.iter().zip(0_u64..) {
+        let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
+        gpu.queue.write_buffer(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
+    }
+}
+
+fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, buffers: &SceneBuffers) {
+    if buffers.meshes.is_empty() {
+        return;
+    }
+    pass.set_pipeline(&pipelines.mesh);
+    for (mesh, group) in buffers.meshes.iter().zip(&slot.mesh_groups) {
+        pass.set_bind_group(1, group, &[]);
+        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..mesh.count, 0, 0..1);
+    }
+}
+
+/// Reversed depth, cleared: 0 is infinitely far.
+fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
     }
 }
 
@@ -394,7 +433,7 @@ fn pipeline(
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
-    format: wgpu::TextureFormat,
+    color: Option<wgpu::TextureFormat>,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
     let module = shaders::module(&gpu.device, file, file, &[])?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
@@ -404,6 +443,7 @@ fn pipeline(
         immediate_size: 0,
     });
     let compilation_options = wgpu::PipelineCompilationOptions::default();
+    let targets = [color.map(wgpu::ColorTargetState::from)];
     Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(file),
         layout: Some(&layout),
@@ -422,11 +462,11 @@ fn pipeline(
             bias: wgpu::DepthBiasState::default(),
         }),
         multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
-        fragment: Some(wgpu::FragmentState {
+        fragment: color.map(|_| wgpu::FragmentState {
             module: &module,
             entry_point: Some("fragment"),
             compilation_options,
-            targets: &[Some(format.into())],
+            targets: &targets,
         }),
         multiview_mask: None,
         cache: None,

@@ -99,11 +99,11 @@ impl<'a> Recorder<'a> {
         self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes })
     }
 
-    /// Begins a render pass that draws to one colour target and the depth target.
+    /// Begins a render pass that draws to a depth target and, if given, a colour target.
     pub fn render_pass(
         &mut self,
         name: &'static str,
-        color: wgpu::RenderPassColorAttachment<'_>,
+        color: Option<wgpu::RenderPassColorAttachment<'_>>,
         depth: wgpu::RenderPassDepthStencilAttachment<'_>,
     ) -> wgpu::RenderPass<'_> {
         let stamps = self.clock.as_mut().and_then(|clock| clock.next(name));
@@ -112,9 +112,10 @@ impl<'a> Recorder<'a> {
             beginning_of_pass_write_index: Some(first),
             end_of_pass_write_index: Some(first + 1),
         });
+        let colors = [color];
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(name),
-            color_attachments: &[Some(color)],
+            color_attachments: if colors[0].is_some() { &colors } else { &[] },
             depth_stencil_attachment: Some(depth),
             timestamp_writes,
             occlusion_query_set: None,

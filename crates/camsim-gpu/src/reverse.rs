@@ -328,9 +328,9 @@ impl Variant {
             vec![(0, b.out_color.as_entire_binding())],
         ];
         let whole = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let fine = b.fine.map(|fine| (whole(&fine.color), fine.depth_view(), &fine.nearest, whole(&fine.lines)));
-        if let Some((color, depth, nearest, lines)) = &fine {
-            resources[1].extend([(5, view(color)), (6, view(depth)), (7, nearest.as_entire_binding()), (8, view(lines))]);
+        let fine = b.fine.map(|fine| (whole(&fine.centre_depth), fine.depth_view(), whole(&fine.lines), &fine.within_reach));
+        if let Some((centre, depth, lines, within_reach)) = &fine {
+            resources[1].extend([(5, view(centre)), (6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
@@ -363,10 +363,10 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
         let samples =
             |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: true };
         ideal.extend([
-            entry(5, samples(wgpu::TextureSampleType::Float { filterable: false })),
+            entry(5, texture(wgpu::TextureSampleType::Depth)),
             entry(6, samples(wgpu::TextureSampleType::Depth)),
-            entry(7, storage(true)),
-            entry(8, texture(wgpu::TextureSampleType::Uint)),
+            entry(7, texture(wgpu::TextureSampleType::Uint)),
+            entry(8, storage(true)),
         ]);
     }
     let lens = match key.ray {
@@ -450,7 +450,7 @@ mod tests {
     #[test]
     fn every_variant_is_valid_without_any_capability() {
         let texts = PipelineKey::all().into_iter().map(|key| (format!("{key:?}"), shaders::compose(SHADER, &key.slots()).unwrap()));
-        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl", "ideal/resolve.wgsl"]
+        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl", "ideal/resolve.wgsl", "ideal/reach.wgsl"]
             .map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
         for (name, text) in texts.chain(ideal) {
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));

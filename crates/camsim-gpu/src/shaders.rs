@@ -20,6 +20,7 @@ embedded![
     "ideal/lines.wgsl",
     "ideal/mesh.wgsl",
     "ideal/resolve.wgsl",
+    "ideal/reach.wgsl",
     "ideal/surface.wgsl",
     "ideal/terrain.wgsl",
     "reverse/color/linear.wgsl",

@@ -9,11 +9,11 @@ use camsim_core::{
     reference::{Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     sequence::Sequence,
-    temporal::edges::{FineImage, KeyView, Keys, gather_edges},
+    temporal::edges::{KeyView, Keys, gather_edges},
 };
 use common::{
     city, engine, pattern,
-    rays::{black_ground_and_roof, expected, fine_samples, linear_psnr, roof},
+    rays::{CastFrame, black_ground_and_roof, expected, linear_psnr, roof},
     render, scenario, sequence, steady,
 };
 use glam::{DVec2, DVec3};
@@ -72,9 +72,8 @@ fn rays_through_several_keys_agree_with_their_twin() {
     let plan = &done.plan;
     let EdgeStage::Supersampled { scale, samples } = plan.edges else { panic!("{:?}", plan.edges) };
     assert_eq!(plan.keys.len(), 3);
-    let images: Vec<_> = plan.keys.iter().map(|key| fine_samples(&sequence, plan, &key.pose, scale)).collect();
-    let lines: Vec<_> = images.iter().map(|samples| FineImage::lines_of(plan.ideal.size_px, scale, samples)).collect();
-    let nearest_w = images.iter().flatten().map(|sample| sample.inverse_depth).fold(0.0, f64::max);
+    let images: Vec<_> = plan.keys.iter().map(|key| CastFrame::new(&sequence, plan, &key.pose, scale)).collect();
+    let nearest_w = images.iter().map(CastFrame::nearest_w).fold(0.0, f64::max);
     let nodes = plan.blur.expect("40 ms blur").nodes;
     let d_uv = [DVec2::new(1.0 / plan.camera.focal_px.x, 0.0), DVec2::new(0.0, 1.0 / plan.camera.focal_px.y)];
     let exposure_s = plan.shutter.exposure_s();
@@ -91,8 +90,7 @@ fn rays_through_several_keys_agree_with_their_twin() {
                 (0..nodes).map(|node| sequence.path.pose(mid_s + phase(node) * exposure_s).relative_to(&key.pose)).collect()
             })
             .collect();
-        let image = |k: usize| FineImage { size_px: plan.ideal.size_px, scale, samples: &images[k], lines: &lines[k] };
-        let views: Vec<_> = poses.iter().enumerate().map(|(k, nodes)| KeyView { nodes, image: image(k) }).collect();
+        let views: Vec<_> = poses.iter().enumerate().map(|(k, nodes)| KeyView { nodes, image: images[k].image() }).collect();
         let exposure_share = exposure_s / (plan.window_s[1] - plan.window_s[0]);
         let keys = Keys { views: &views, line_share: plan.window_share(mid_s), exposure_share, nearest_w };
         let twin = gather_edges(uv, d_uv, &keys, samples, &plan.ideal);

@@ -6,13 +6,13 @@ use camsim_core::{
     plan::EdgeStage,
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     scene::{Scene, Terrain},
-    temporal::edges::{FineImage, KeyView, Keys, gather_edges},
+    temporal::edges::{KeyView, Keys, gather_edges},
     trajectory::Trajectory,
 };
 use camsim_gpu::engine::Finished;
 use common::{
     engine, pattern,
-    rays::{black_ground_and_roof, expected, fine_samples, linear_psnr, roof},
+    rays::{CastFrame, black_ground_and_roof, expected, linear_psnr, roof},
     render, scenario, sequence, steady,
 };
 use glam::{DVec2, DVec3};
@@ -70,10 +70,7 @@ fn rays_at_silhouettes_agree_with_their_twin() {
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
     let plan = &done.plan;
     let EdgeStage::Supersampled { scale, samples } = plan.edges else { panic!("{:?}", plan.edges) };
-    let fine = fine_samples(&sequence, plan, &plan.key_pose, scale);
-    let nearest = fine.iter().map(|sample| sample.inverse_depth).fold(0.0, f64::max);
-    let lines = FineImage::lines_of(plan.ideal.size_px, scale, &fine);
-    let image = FineImage { size_px: plan.ideal.size_px, scale, samples: &fine, lines: &lines };
+    let cast = CastFrame::new(&sequence, plan, &plan.key_pose, scale);
     let nodes = plan.blur.expect("15 ms blur").nodes;
     let d_uv = [DVec2::new(1.0 / plan.camera.focal_px.x, 0.0), DVec2::new(0.0, 1.0 / plan.camera.focal_px.y)];
     let (mut sum, mut differing, mut compared) = (0.0, 0, 0);
@@ -87,8 +84,8 @@ fn rays_at_silhouettes_agree_with_their_twin() {
                 sequence.path.pose(t_s).relative_to(&plan.key_pose)
             })
             .collect();
-        let views = [KeyView { nodes: &poses, image }];
-        let keys = Keys { views: &views, line_share: 0.5, exposure_share: 1.0, nearest_w: nearest };
+        let views = [KeyView { nodes: &poses, image: cast.image() }];
+        let keys = Keys { views: &views, line_share: 0.5, exposure_share: 1.0, nearest_w: cast.nearest_w() };
         let twin = gather_edges(uv, d_uv, &keys, samples, &plan.ideal);
         let error = (twin.x - f64::from(done.frame.color_rgba[4 * i])).abs();
         sum += error;

@@ -1,8 +1,12 @@
 // No silhouette can be in view: the plain gather stands.
 #import reverse/edges/seen.wgsl
 
-fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
-    return plain;
+fn needs_rays(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> bool {
+    return false;
+}
+
+fn cast_rays(thread: u32, pixel: vec2<u32>, ray: Ray, needed: bool) -> vec3<f32> {
+    return vec3<f32>(0.0);
 }
 
 fn seen_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {

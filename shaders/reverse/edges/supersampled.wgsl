@@ -1,15 +1,17 @@
 // Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with its own pose and depth, and each with
-// the colour of the one sample of the ideal frame that it meets, so that surfaces never mix but by area and time.
+// the colour of the one surface of the ideal frame that it meets, so that surfaces never mix but by area and time.
 // Twin: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
 #import reverse/edges/seen.wgsl
 
-@group(1) @binding(5) var fine_color: texture_multisampled_2d<f32>;
+// Depth value at the middle of each ideal pixel, where its colour is.
+@group(1) @binding(5) var centre_depth: texture_depth_2d;
 @group(1) @binding(6) var fine_depth: texture_depth_multisampled_2d;
-// Largest depth value of the ideal frame, as bits.
-@group(1) @binding(7) var<storage, read> nearest: u32;
 // Borders of two surfaces within fine pixels: see ideal/lines.wgsl.
-@group(1) @binding(8) var fine_lines: texture_2d<u32>;
+@group(1) @binding(7) var fine_lines: texture_2d<u32>;
+// A word for each 8x8 ideal pixels, made by ideal/reach.wgsl: what is within reach of a ray that would come from there were it infinitely far.
+// The bits of the largest depth value, the lowest one replaced by whether there is a marked pixel.
+@group(1) @binding(8) var<storage, read> within_reach: array<u32>;
 
 // Golden ratio: multiples are even over an interval for any number of them.
 const GOLDEN: f32 = 0.6180339887;
@@ -24,6 +26,10 @@ const GAP_PX: f32 = 0.1;
 const PLAIN_PX: f32 = 0.25;
 // Depths that agree to within this, in the same measure, are of one surface.
 const SAME_PX: f32 = 0.25;
+// Depths of four pixels this near to each other, relative to the nearest, are of one surface.
+const SURFACE_STEP: f32 = 0.005;
+// Bilinear weight from which pixels of the same surface give its colour.
+const LEAST_WEIGHT: f32 = 1e-3;
 
 struct FineSample {
     texel: vec2<i32>,
@@ -77,14 +83,59 @@ fn fine_inverse_depth(at_px: vec2<f32>) -> f32 {
     return textureLoad(fine_depth, s.texel, s.index) / frame.near_m;
 }
 
-fn fine_color_at(at_px: vec2<f32>) -> vec3<f32> {
+// Colour of the surface that is seen at a place: bilinear between the pixels around it that show the same surface as the place's sample;
+// where none does, that of the nearest in depth of the sixteen around it.
+fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
     let s = fine_sample(at_px);
-    return textureLoad(fine_color, s.texel, s.index).rgb;
+    let depth = textureLoad(fine_depth, s.texel, s.index);
+    let last = vec2<f32>(frame.ideal_size_px) - 1.0;
+    let at = clamp(at_px, vec2<f32>(0.0), last);
+    let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
+    let t = at - base;
+    let first = vec2<i32>(0, key_row());
+    let b = first + vec2<i32>(base);
+    let top = min(b + 1, first + vec2<i32>(last));
+    let around = vec4<f32>(
+        textureLoad(centre_depth, b, 0),
+        textureLoad(centre_depth, vec2<i32>(top.x, b.y), 0),
+        textureLoad(centre_depth, vec2<i32>(b.x, top.y), 0),
+        textureLoad(centre_depth, top, 0),
+    );
+    let high = max(max(max(around.x, around.y), max(around.z, around.w)), depth);
+    let low = min(min(min(around.x, around.y), min(around.z, around.w)), depth);
+    let between = select(0.5 * (low + high), -1.0, low >= (1.0 - SURFACE_STEP) * high);
+    let same = (around > vec4<f32>(between)) == vec4<bool>(depth > between);
+    let weights = select(vec4<f32>(0.0), vec4<f32>((1.0 - t.x) * (1.0 - t.y), t.x * (1.0 - t.y), (1.0 - t.x) * t.y, t.x * t.y), same);
+    let weight = dot(weights, vec4<f32>(1.0));
+    if (weight > LEAST_WEIGHT) {
+        let sum = weights.x * textureLoad(ideal_color, b, 0).rgb
+            + weights.y * textureLoad(ideal_color, vec2<i32>(top.x, b.y), 0).rgb
+            + weights.z * textureLoad(ideal_color, vec2<i32>(b.x, top.y), 0).rgb
+            + weights.w * textureLoad(ideal_color, top, 0).rgb;
+        return sum / weight;
+    }
+    var best = b;
+    var least = 1e30;
+    for (var i = 0; i < 16; i++) {
+        let texel = clamp(b + vec2<i32>(i % 4 - 1, i / 4 - 1), first, first + vec2<i32>(last));
+        let off = abs(textureLoad(centre_depth, texel, 0) - depth);
+        if (off < least) {
+            least = off;
+            best = texel;
+        }
+    }
+    return textureLoad(ideal_color, best, 0).rgb;
 }
 
-// Of the nearest surface, as a line's own camera sees it.
-fn nearest_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
-    let in_key = 1.02 * bitcast<f32>(nearest) / frame.near_m;
+// What a ray may meet that comes from here if it is infinitely far.
+fn reach_of(far_px: vec2<f32>) -> u32 {
+    let at = vec2<u32>(clamp(far_px + 0.5, vec2<f32>(0.0), vec2<f32>(frame.ideal_size_px) - 1.0)) + vec2<u32>(0u, u32(key_row()));
+    return within_reach[(at.y / 8u) * ((textureDimensions(ideal_color).x + 7u) / 8u) + at.x / 8u];
+}
+
+// Of the nearest surface within reach, as a line's own camera sees it.
+fn nearest_inverse_depth(uv: vec2<f32>, pose: Pose, reach: u32) -> f32 {
+    let in_key = 1.02 * bitcast<f32>(reach & 0xfffffffeu) / frame.near_m;
     // A camera that all but reaches the surface would stretch the search without end.
     return min(line_inverse_depth(uv, pose, in_key), 4.0 * in_key);
 }
@@ -110,9 +161,14 @@ fn ray_place(i: u32) -> vec3<f32> {
 
 // Whether the pixel's rays of one pose may meet several surfaces: their parallax passes a silhouette.
 fn near_edge(uv: vec2<f32>, pose: Pose) -> bool {
-    let near = point_at(uv, pose, nearest_inverse_depth(uv, pose));
     let far = point_at(uv, pose, 0.0);
-    return near.z > 0.0 && far.z > 0.0 && passes_edge(ideal_px_from_point(near), ideal_px_from_point(far));
+    let far_px = ideal_px_from_point(far);
+    let reach = reach_of(far_px);
+    if (far.z <= 0.0 || (reach & 1u) == 0u) {
+        return false;
+    }
+    let near = point_at(uv, pose, nearest_inverse_depth(uv, pose, reach));
+    return near.z > 0.0 && passes_edge(ideal_px_from_point(near), far_px);
 }
 
 // Pose in the chosen key at a share of the exposure; nodes are equally far apart in time.
@@ -147,19 +203,53 @@ fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
     return true;
 }
 
-fn gather_edges(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> Gathered {
+// Whether what the plain gather took does not stand.
+fn needs_rays(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> bool {
     // Above 1 where a mark lies under a negative weight of the spline.
-    if (abs(plain.color.a - 1.0) <= 1e-4 && (!HAS_PARALLAX || sees_one_surface(pixel, ray))) {
-        return plain;
+    return abs(plain.color.a - 1.0) > 1e-4 || (HAS_PARALLAX && !sees_one_surface(pixel, ray));
+}
+
+// Pixels of the workgroup that need rays, as numbers of their threads; what their rays start from; and the colours of 64 rays.
+var<workgroup> asking: array<u32, 64>;
+var<workgroup> asking_rays: array<Ray, 64>;
+var<workgroup> asking_count: atomic<u32>;
+var<workgroup> ray_colors: array<vec3<f32>, 64>;
+
+// The mean colour of the rays of each pixel that needs some. Such pixels are few and lie in strips: their rays are dealt out to all threads
+// of the workgroup, which keeps a processor's lanes busy. Every thread calls it, with its pixel and whether that needs rays.
+fn cast_rays(thread: u32, pixel: vec2<u32>, ray: Ray, needed: bool) -> vec3<f32> {
+    var place = 0u;
+    if (needed) {
+        place = atomicAdd(&asking_count, 1u);
+        asking[place] = thread;
+        asking_rays[place] = ray;
     }
+    workgroupBarrier();
+    let first_pixel = pixel - vec2<u32>(thread % 8u, thread / 8u);
+    let rays = atomicLoad(&asking_count) * frame.edge_samples;
     var sum = vec3<f32>(0.0);
-    for (var i = 0u; i < frame.edge_samples; i++) {
-        let place = ray_place(i);
-        let found = first_surface_of_keys(pixel, ray.uv + place.x * ray.d_dx + place.y * ray.d_dy, place.z);
-        sum += fine_color_at(found.at_px);
+    for (var begin = 0u; begin < rays; begin += 64u) {
+        let i = begin + thread;
+        if (i < rays) {
+            let which = i / frame.edge_samples;
+            let its_pixel = first_pixel + vec2<u32>(asking[which] % 8u, asking[which] / 8u);
+            let its_ray = asking_rays[which];
+            let at = ray_place(i % frame.edge_samples);
+            let found = first_surface_of_keys(its_pixel, its_ray.uv + at.x * its_ray.d_dx + at.y * its_ray.d_dy, at.z);
+            ray_colors[thread] = surface_color_at(found.at_px);
+        }
+        workgroupBarrier();
+        if (needed) {
+            // Its own rays among these, in their order.
+            let last = min((place + 1u) * frame.edge_samples, begin + 64u);
+            for (var k = max(place * frame.edge_samples, begin); k < last; k++) {
+                sum += ray_colors[k - begin];
+            }
+        }
+        workgroupBarrier();
     }
     use_key_of_line(pixel);
-    return Gathered(vec4<f32>(sum / f32(frame.edge_samples), 1.0), plain.inside);
+    return sum / f32(frame.edge_samples);
 }
 
 // What the centre of a pixel sees: the pixel's own ray, in the key that sees its end.
@@ -232,17 +322,19 @@ fn met_before(uv: vec2<f32>, pose: Pose, free: Look, px_per_w: f32) -> Met {
     return Met(there.at_px, there.found, abs(free.found - there.found) * px_per_w < GAP_PX && inside_ideal(there.at_px));
 }
 
-// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface of all to infinity, lie on a line of
+// Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface within reach to infinity, lie on a line of
 // the ideal frame: as long as they are nearer than what the key shows at their places the ray is free. Where it is free no longer and
 // the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still hidden when it
 // gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last stands in.
 fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
-    let w_near = nearest_inverse_depth(uv, pose);
-    let near_px = ideal_px_from_point(point_at(uv, pose, w_near));
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
+    let w_near = nearest_inverse_depth(uv, pose, reach_of(far_px));
+    let near_px = ideal_px_from_point(point_at(uv, pose, w_near));
     let px_per_w = distance(near_px, far_px) / max(w_near, 1e-12);
-    if (px_per_w * w_near < 0.1 * GAP_PX) {
-        return Met(far_px, line_inverse_depth(uv, pose, fine_inverse_depth(far_px)), true);
+    if (px_per_w * w_near < GAP_PX) {
+        // Nothing hides: one step from the far end.
+        let there = look_at(uv, pose, line_inverse_depth(uv, pose, fine_inverse_depth(far_px)));
+        return Met(there.at_px, there.found, true);
     }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);
     var free = look_at(uv, pose, w_near);

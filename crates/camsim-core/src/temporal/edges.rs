@@ -1,5 +1,5 @@
-//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the one sample of a supersampled ideal
-//! frame that it meets. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`; borders within
+//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the depth of the one sample of a supersampled
+//! ideal frame that it meets, and with the colour of that surface. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`; borders within
 //! a pixel are [`super::lines`].
 
 use glam::{DMat3, DVec2, DVec3};
@@ -23,24 +23,33 @@ pub const EDGE_STEP: f64 = 0.01;
 /// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another picture begins, bends less.
 pub const FINE_EDGE_STEP: f64 = 0.003;
 
-/// One of the four samples of a fine pixel.
+/// Depths of four pixels this near to each other, relative to the nearest, are of one surface.
+const SURFACE_STEP: f64 = 0.005;
+
+/// Bilinear weight from which pixels of the same surface give its colour.
+const LEAST_WEIGHT: f64 = 1e-3;
+
+/// What is at the middle of an ideal pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FineSample {
+pub struct Centre {
     /// Inverse planar depth in the key camera, 1/m, 0 = sky.
     pub inverse_depth: f64,
     /// Linear R G B.
     pub color: DVec3,
 }
 
-/// A supersampled ideal frame: `scale` fine pixels along a side of an ideal pixel, four samples each.
+/// An ideal frame whose depth is supersampled: `scale` fine pixels along a side of an ideal pixel, four samples each.
 #[derive(Clone, Copy, Debug)]
 pub struct FineImage<'a> {
     /// Ideal width, height.
     pub size_px: [u32; 2],
     /// Fine pixels along a side of an ideal pixel.
     pub scale: u32,
-    /// Row-major fine pixels, four samples each, in the order of [`FineImage::SAMPLE_PLACES`].
-    pub samples: &'a [FineSample],
+    /// Inverse planar depth in the key camera, 1/m, 0 = sky: row-major fine pixels, four samples each, in the order of
+    /// [`FineImage::SAMPLE_PLACES`].
+    pub samples: &'a [f64],
+    /// Row-major ideal pixels.
+    pub centres: &'a [Centre],
     /// Borders within fine pixels, as [`FineImage::lines_of`] finds them; empty for none.
     pub lines: &'a [Option<EdgeLine>],
 }
@@ -52,16 +61,16 @@ impl FineImage<'_> {
 
     /// The border within each fine pixel, for [`FineImage::lines`].
     #[must_use]
-    pub fn lines_of(size_px: [u32; 2], scale: u32, samples: &[FineSample]) -> Vec<Option<EdgeLine>> {
+    pub fn lines_of(size_px: [u32; 2], scale: u32, samples: &[f64]) -> Vec<Option<EdgeLine>> {
         let [width, height] = size_px.map(|side| i64::from(side * scale));
-        let depth = |[x, y]: [i64; 2], i: usize| samples[4 * (y * width + x) as usize + i].inverse_depth;
+        let depth = |[x, y]: [i64; 2], i: usize| samples[4 * (y * width + x) as usize + i];
         (0..width * height).map(|i| edge_line([i % width, i / width], [width, height], &depth)).collect()
     }
 
-    /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine
-    /// pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
+    /// Inverse depth (1/m) of the sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces
+    /// runs through the fine pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
     #[must_use]
-    pub fn at(&self, at_px: DVec2) -> FineSample {
+    pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
         let size_px = self.size_px.map(|side| i64::from(side * self.scale));
         let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
         let at = (at_px + 0.5).clamp(DVec2::ZERO, last) * f64::from(self.scale);
@@ -75,12 +84,42 @@ impl FineImage<'_> {
         let nearer = line.normal.dot(at - corner - 0.5) > line.offset_px;
         let of_side = |texel: [i64; 2]| {
             let samples = (0..4).map(|k| self.samples[4 * index(texel) + (quarter ^ k)]);
-            samples.into_iter().find(|sample| (sample.inverse_depth > line.between) == nearer)
+            samples.into_iter().find(|&depth| (depth > line.between) == nearer)
         };
         // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has some.
         let towards = if nearer { line.normal } else { -line.normal };
         let beside = |k: usize| (texel[k] + towards[k].round_ties_even() as i64).clamp(0, size_px[k] - 1);
         of_side(texel).or_else(|| of_side([beside(0), beside(1)])).unwrap_or(own)
+    }
+
+    /// Linear R G B at a position of the surface that is seen there: bilinear between those of the four pixels around it that show the same
+    /// surface as [`FineImage::inverse_depth`] has; where none does, the nearest in depth of the sixteen around it.
+    #[must_use]
+    pub fn color(&self, at_px: DVec2) -> DVec3 {
+        let depth = self.inverse_depth(at_px);
+        let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1.0;
+        let at = at_px.clamp(DVec2::ZERO, last);
+        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
+        let t = at - base;
+        let centre = |x: i32, y: i32| {
+            let [x, y] = [base.x + f64::from(x), base.y + f64::from(y)];
+            self.centres[(y.clamp(0.0, last.y) * (last.x + 1.0) + x.clamp(0.0, last.x)) as usize]
+        };
+        let around = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
+            let weight = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
+            (centre(x, y), weight)
+        });
+        let high = around.iter().fold(depth, |high, (c, _)| high.max(c.inverse_depth));
+        let low = around.iter().fold(depth, |low, (c, _)| low.min(c.inverse_depth));
+        let between = if low >= (1.0 - SURFACE_STEP) * high { -1.0 } else { 0.5 * (low + high) };
+        let same = around.iter().filter(|(c, _)| (c.inverse_depth > between) == (depth > between));
+        let (sum, weight) = same.fold((DVec3::ZERO, 0.0), |(sum, total), (c, weight)| (sum + *weight * c.color, total + weight));
+        if weight > LEAST_WEIGHT {
+            return sum / weight;
+        }
+        let wider = (-1..3).flat_map(|y| (-1..3).map(move |x| (x, y))).map(|(x, y)| centre(x, y));
+        let off = |c: &Centre| (c.inverse_depth - depth).abs();
+        wider.min_by(|a, b| off(a).total_cmp(&off(b))).map_or(DVec3::ZERO, |c| c.color)
     }
 }
 
@@ -186,15 +225,17 @@ pub fn first_surface(uv: DVec2, key_from_line: (DMat3, DVec3), nearest_w: f64, i
     // Place, and the inverse depth that the line's camera gives to what the key shows there.
     let look_at = |w: f64| {
         let at_px = place(w);
-        (at_px, in_line(image.at(at_px).inverse_depth))
+        (at_px, in_line(image.inverse_depth(at_px)))
     };
     // A camera that all but reaches the nearest surface would stretch the search without end.
     let w_near = in_line(1.02 * nearest_w).min(4.0 * 1.02 * nearest_w);
     let (far_px, at_infinity) = look_at(0.0);
     let length_px = place(w_near).distance(far_px);
     let px_per_w = length_px / w_near.max(1e-12);
-    if length_px < 0.1 * GAP_PX {
-        return Met { at_px: far_px, in_line: at_infinity, seen: true };
+    if length_px < GAP_PX {
+        // Nothing hides: one step from the far end.
+        let (at_px, found) = look_at(at_infinity);
+        return Met { at_px, in_line: found, seen: true };
     }
     // A ray that is free at two looks, the second deeper than what the first saw, may have met that in between: it has if the surface goes
     // on to where the ray is as deep.
@@ -257,7 +298,7 @@ pub fn gather_edges(uv: DVec2, d_uv: [DVec2; 2], keys: &Keys<'_>, count: u32, id
         let (place, share) = ray_place(i, count);
         let ray = uv + place.x * d_uv[0] + place.y * d_uv[1];
         if let Some((key, met)) = first_surface_of_keys(ray, share, keys, ideal) {
-            sum += keys.views[key].image.at(met.at_px).color;
+            sum += keys.views[key].image.color(met.at_px);
         }
     }
     sum / f64::from(count.max(1))
@@ -274,22 +315,40 @@ mod tests {
     const GROUND: f64 = 1.0 / 60.0;
 
     /// A white roof to the left of the plane x = 0, 20 m before the camera, over black ground 60 m before it.
-    fn image(scale: u32) -> Vec<FineSample> {
-        let [width, height] = IDEAL.size_px.map(|side| side * scale);
-        let fine_pixels = (0..width * height).map(|i| DVec2::new(f64::from(i % width), f64::from(i / width)));
-        fine_pixels
-            .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5))
-            .map(|at_px| {
-                let roof = at_px.x < IDEAL.principal_px.x;
-                FineSample { inverse_depth: if roof { ROOF } else { GROUND }, color: if roof { DVec3::ONE } else { DVec3::ZERO } }
-            })
-            .collect()
+    fn image(scale: u32) -> Drawn {
+        draw(scale, |at_px| {
+            let roof = at_px.x < IDEAL.principal_px.x;
+            Centre { inverse_depth: if roof { ROOF } else { GROUND }, color: if roof { DVec3::ONE } else { DVec3::ZERO } }
+        })
+    }
+
+    struct Drawn {
+        scale: u32,
+        samples: Vec<f64>,
+        centres: Vec<Centre>,
+    }
+
+    impl Drawn {
+        fn image(&self) -> FineImage<'_> {
+            FineImage { size_px: IDEAL.size_px, scale: self.scale, samples: &self.samples, centres: &self.centres, lines: &[] }
+        }
+    }
+
+    fn draw(scale: u32, look: impl Fn(DVec2) -> Centre) -> Drawn {
+        let corners = |[width, height]: [u32; 2]| (0..width * height).map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)));
+        let fine = corners(IDEAL.size_px.map(|side| side * scale))
+            .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5));
+        Drawn {
+            scale,
+            samples: fine.map(|at_px| look(at_px).inverse_depth).collect(),
+            centres: corners(IDEAL.size_px).map(&look).collect(),
+        }
     }
 
     #[test]
     fn rays_meet_the_nearest_surface_and_holes_show_the_farther_one() {
-        let samples = image(2);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples, lines: &[] };
+        let drawn = image(2);
+        let image = drawn.image();
         for shift_m in [-1.5, -0.4, -0.02, 0.0, 0.02, 0.4, 1.5] {
             let pose = (DMat3::IDENTITY, DVec3::new(shift_m, 0.0, 0.0));
             for k in -400..=400 {
@@ -302,24 +361,24 @@ mod tests {
                 }
                 let met = first_surface(DVec2::new(u, 0.01), pose, ROOF, &image, &IDEAL);
                 let at_px = met.at_px;
-                let seen = image.at(at_px);
+                let seen = image.inverse_depth(at_px);
                 let roof = border_px < 0.0;
-                assert_eq!(seen.inverse_depth, if roof { ROOF } else { GROUND }, "shift {shift_m}, u {u}: {at_px}");
-                let exact_px = (u + shift_m * seen.inverse_depth) * IDEAL.focal_px.x + IDEAL.principal_px.x;
+                assert_eq!(seen, if roof { ROOF } else { GROUND }, "shift {shift_m}, u {u}: {at_px}");
+                let exact_px = (u + shift_m * seen) * IDEAL.focal_px.x + IDEAL.principal_px.x;
                 // Under the roof, and deep enough under it to tell: said to be so.
                 let under_px = IDEAL.principal_px.x - exact_px;
                 let hidden = !roof && under_px > -0.3;
                 assert!(hidden || (at_px.x - exact_px).abs() <= LOOK_PX / 32.0 + 1e-9, "shift {shift_m}, u {u}: {at_px} {exact_px}");
                 assert!(met.seen != (hidden && under_px > 0.3) || under_px.abs() <= 0.3, "shift {shift_m}, u {u}: {met:?} {under_px}");
-                assert_eq!(met.in_line, seen.inverse_depth);
+                assert_eq!(met.in_line, seen);
             }
         }
     }
 
     #[test]
     fn a_pixel_across_a_border_gets_its_share() {
-        let samples = image(2);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 2, samples: &samples, lines: &[] };
+        let drawn = image(2);
+        let image = drawn.image();
         let pixel = 1.0 / IDEAL.focal_px.x;
         let of = |nodes: &[(DMat3, DVec3)], uv: DVec2| {
             let views = [KeyView { nodes, image }];
@@ -344,24 +403,18 @@ mod tests {
     fn a_second_key_shows_what_the_first_hides() {
         // As `image`, but the ground's colour is its place: the key at x = 1.5 m sees 3 px more of it beside the roof.
         let ground_m = |at_px: DVec2, key_m: f64| (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x / GROUND + key_m;
-        let seen_from = |key_m: f64| -> Vec<FineSample> {
-            let [width, height] = IDEAL.size_px.map(|side| side * 2);
-            let corners = (0..width * height).map(|i| DVec2::new(f64::from(i % width), f64::from(i / width)));
-            corners
-                .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / 2.0 - 0.5))
-                .map(|at_px| {
-                    let roof = (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x < -key_m * ROOF;
-                    let w = if roof { ROOF } else { GROUND };
-                    FineSample { inverse_depth: w, color: if roof { DVec3::splat(-100.0) } else { DVec3::splat(ground_m(at_px, key_m)) } }
-                })
-                .collect()
+        let seen_from = |key_m: f64| {
+            draw(2, |at_px| {
+                let roof = (at_px.x - IDEAL.principal_px.x) / IDEAL.focal_px.x < -key_m * ROOF;
+                let w = if roof { ROOF } else { GROUND };
+                Centre { inverse_depth: w, color: if roof { DVec3::splat(-100.0) } else { DVec3::splat(ground_m(at_px, key_m)) } }
+            })
         };
         let keys_m = [-1.5, 1.5];
         let images = keys_m.map(seen_from);
         // The line's camera stands at x = 1.2 m, nearer in time to the first key.
         let nodes = keys_m.map(|key_m| [(DMat3::IDENTITY, DVec3::new(1.2 - key_m, 0.0, 0.0))]);
-        let views = [0, 1]
-            .map(|k| KeyView { nodes: &nodes[k], image: FineImage { size_px: IDEAL.size_px, scale: 2, samples: &images[k], lines: &[] } });
+        let views = [0, 1].map(|k| KeyView { nodes: &nodes[k], image: images[k].image() });
         let mut filled = 0;
         for k in -60..200 {
             let u = f64::from(k) * 2e-3;
@@ -373,11 +426,11 @@ mod tests {
             let color = |views: &[KeyView<'_>]| {
                 let keys = Keys { views, line_share: 0.1, exposure_share: 0.0, nearest_w: ROOF };
                 let (key, met) = first_surface_of_keys(DVec2::new(u, 0.0), 0.5, &keys, &IDEAL).unwrap();
-                (views[key].image.at(met.at_px).color.x - expected).abs()
+                (views[key].image.color(met.at_px).x - expected).abs()
             };
             let (one, two) = (color(&views[..1]), color(&views));
-            // A sample stands for a quarter of a pixel.
-            assert!(two <= 0.5 / IDEAL.focal_px.x / GROUND, "{u}: {two}");
+            // Beside the roof the colour of the last pixel of the ground stands for what is up to a pixel away.
+            assert!(two <= 1.0 / IDEAL.focal_px.x / GROUND, "{u}: {two}");
             filled += u32::from(one > 1.0);
         }
         assert!(filled > 20, "one key must not suffice: {filled}");
@@ -419,11 +472,11 @@ mod tests {
 
     #[test]
     fn a_ray_that_is_not_a_number_has_some_place() {
-        let samples = image(1);
-        let image = FineImage { size_px: IDEAL.size_px, scale: 1, samples: &samples, lines: &[] };
+        let drawn = image(1);
+        let image = drawn.image();
         for uv in [DVec2::NAN, DVec2::splat(f64::INFINITY), DVec2::splat(1e300)] {
             let at_px = first_surface(uv, (DMat3::IDENTITY, DVec3::splat(0.5)), ROOF, &image, &IDEAL).at_px;
-            let _ = image.at(at_px);
+            let _ = image.color(at_px);
         }
     }
 }

@@ -13,26 +13,32 @@ use crate::{
 pub const FINE_SAMPLES: u32 = 4;
 /// A packed normal and offset, and the depth value between the surfaces.
 const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
-/// Edge of the square workgroups.
+/// Edge of the square workgroups, and of the tiles.
 const WORKGROUP_PX: u32 = 8;
+/// Tiles that a workgroup of `shaders/ideal/reach.wgsl` takes.
+const REACH_WORKGROUP: u32 = 64;
 
 /// Textures that a supersampled ideal frame is drawn to.
 #[derive(Debug)]
 pub struct FineTarget {
     /// Fine pixels along a side of an ideal pixel.
     pub scale: u32,
-    /// Linear colour, 4 samples a fine pixel.
-    pub color: wgpu::Texture,
     /// near / z, 4 samples a fine pixel.
     pub depth: wgpu::Texture,
-    /// Mean colour of each fine pixel.
-    pub averaged: wgpu::Texture,
-    /// One u32: the bits of the frame's largest near / z.
-    pub nearest: wgpu::Buffer,
+    /// Linear colour at the middle of each ideal pixel.
+    pub centre_color: wgpu::Texture,
+    /// near / z there.
+    pub centre_depth: wgpu::Texture,
     /// Borders of two surfaces within fine pixels: `shaders/ideal/lines.wgsl`.
     pub lines: wgpu::Texture,
-    /// Four u32: width and height of an ideal frame and the rows from one to the next, for the resolve pass.
+    /// A word for each 8x8 ideal pixels of the target, see `shaders/ideal/reach.wgsl`.
+    pub within_reach: wgpu::Buffer,
+    /// The same half done.
+    within_rows: wgpu::Buffer,
+    /// Four u32: width and height of an ideal frame, and the rows from one to the next, for the resolve pass.
     layout: wgpu::Buffer,
+    /// Four u32: tiles across and down, and the reach in tiles.
+    tile_layout: wgpu::Buffer,
 }
 
 /// Fine pixels along a side of an ideal pixel, for frames that need any.
@@ -66,28 +72,24 @@ pub(super) fn texture(
 impl FineTarget {
     pub(super) fn new(gpu: &GpuContext, ideal_px: [u32; 2], scale: u32) -> Self {
         let size_px = ideal_px.map(|side| side * scale);
+        let tiles = ideal_px.map(|side| u64::from(side.div_ceil(WORKGROUP_PX)));
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let nearest = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("camsim.ideal.nearest"),
-            size: 4,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let layout = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("camsim.ideal.layout"),
-            size: 16,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let buffer = |label, size, usage| {
+            let usage = usage | wgpu::BufferUsages::COPY_DST;
+            gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+        };
+        let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
         Self {
             scale,
             lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
-            layout,
-            color: texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage),
+            layout: buffer("camsim.ideal.layout", 16, uniform),
+            tile_layout: buffer("camsim.ideal.tile_layout", 16, uniform),
+            within_reach: buffer("camsim.ideal.within_reach", 4 * tiles[0] * tiles[1], storage),
+            within_rows: buffer("camsim.ideal.within_rows", 4 * tiles[0] * tiles[1], storage),
             depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
-            averaged: texture(gpu, "camsim.ideal.averaged_color", size_px, COLOR_FORMAT, 1, usage),
-            nearest,
+            centre_color: texture(gpu, "camsim.ideal.centre_color", ideal_px, COLOR_FORMAT, 1, usage),
+            centre_depth: texture(gpu, "camsim.ideal.centre_depth", ideal_px, DEPTH_FORMAT, 1, usage),
         }
     }
 
@@ -98,11 +100,13 @@ impl FineTarget {
     }
 }
 
-/// Samples to pixels, and the mark of silhouettes.
+/// Samples to pixels, the mark of silhouettes, and what lies within reach of each place.
 #[derive(Debug)]
 pub(super) struct ResolvePass {
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::ComputePipeline,
+    reach_layout: wgpu::BindGroupLayout,
+    reach: [wgpu::ComputePipeline; 2],
 }
 
 impl ResolvePass {
@@ -113,33 +117,45 @@ impl ResolvePass {
         let read = |sample_type, multisampled| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
         let write = |format| wgpu::BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension };
         let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("camsim.ideal.resolve"),
-            entries: &[
-                entry(0, read(wgpu::TextureSampleType::Depth, true)),
-                entry(1, read(wgpu::TextureSampleType::Float { filterable: false }, false)),
-                entry(2, write(COLOR_FORMAT)),
-                entry(3, write(wgpu::TextureFormat::R32Float)),
-                entry(4, buffer(wgpu::BufferBindingType::Storage { read_only: false })),
-                entry(5, buffer(wgpu::BufferBindingType::Uniform)),
-                entry(6, write(LINES_FORMAT)),
+        let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+        let group = |entries: &[wgpu::BindGroupLayoutEntry]| {
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.resolve"), entries })
+        };
+        let layout = group(&[
+            entry(0, read(wgpu::TextureSampleType::Depth, true)),
+            entry(1, read(wgpu::TextureSampleType::Float { filterable: false }, false)),
+            entry(2, write(COLOR_FORMAT)),
+            entry(3, write(wgpu::TextureFormat::R32Float)),
+            entry(4, storage(false)),
+            entry(5, buffer(wgpu::BufferBindingType::Uniform)),
+            entry(6, write(LINES_FORMAT)),
+        ]);
+        let reach_layout = group(&[entry(0, storage(true)), entry(1, storage(false)), entry(2, buffer(wgpu::BufferBindingType::Uniform))]);
+        let pipeline = |file, entry_point, layout| -> Result<_, ComposeError> {
+            let module = shaders::module(device, file, file, &[])?;
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(file),
+                bind_group_layouts: &[Some(layout)],
+                immediate_size: 0,
+            });
+            Ok(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(file),
+                layout: Some(&layout),
+                module: &module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                cache: None,
+            }))
+        };
+        Ok(Self {
+            pipeline: pipeline("ideal/resolve.wgsl", "resolve", &layout)?,
+            reach: [
+                pipeline("ideal/reach.wgsl", "along_rows", &reach_layout)?,
+                pipeline("ideal/reach.wgsl", "along_columns", &reach_layout)?,
             ],
-        });
-        let module = shaders::module(device, "camsim.ideal.resolve", "ideal/resolve.wgsl", &[])?;
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("camsim.ideal.resolve"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some("camsim.ideal.resolve"),
-            layout: Some(&pipeline_layout),
-            module: &module,
-            entry_point: Some("resolve"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            cache: None,
-        });
-        Ok(Self { layout, pipeline })
+            layout,
+            reach_layout,
+        })
     }
 
     /// Records the resolve of a plan's ideal frames.
@@ -148,27 +164,54 @@ impl ResolvePass {
         let size_px = [plan.ideal.size_px[0], rows * last + plan.ideal.size_px[1]];
         let layout = [plan.ideal.size_px[0], plan.ideal.size_px[1], rows, 0];
         gpu.queue.write_buffer(&fine.layout, 0, bytemuck::cast_slice(&layout));
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (depth_samples, averaged, color, depth) = (fine.depth_view(), view(&fine.averaged), view(&target.color), view(&target.depth));
-        let lines = view(&fine.lines);
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("camsim.ideal.resolve"),
-            layout: &self.layout,
-            entries: &[
-                entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
-                entry(1, wgpu::BindingResource::TextureView(&averaged)),
-                entry(2, wgpu::BindingResource::TextureView(&color)),
-                entry(3, wgpu::BindingResource::TextureView(&depth)),
-                entry(4, fine.nearest.as_entire_binding()),
-                entry(5, fine.layout.as_entire_binding()),
-                entry(6, wgpu::BindingResource::TextureView(&lines)),
-            ],
-        });
-        recorder.encoder().clear_buffer(&fine.nearest, 0, None);
+        let [across, down] = target.allocated_px.map(|side| side.div_ceil(WORKGROUP_PX));
+        let reach = plan.mark_reach_px().div_ceil(WORKGROUP_PX).min(across.max(down));
+        gpu.queue.write_buffer(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
+        // What the frame does not cover has nothing.
+        recorder.encoder().clear_buffer(&fine.within_reach, 0, None);
+        let [group, along_rows, along_columns] = self.bind(gpu, target, fine);
         let mut pass = recorder.compute_pass("resolve");
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
+        for (pipeline, group) in self.reach.iter().zip([along_rows, along_columns]) {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.dispatch_workgroups((across * down).div_ceil(REACH_WORKGROUP), 1, 1);
+        }
     }
+
+    fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &FineTarget) -> [wgpu::BindGroup; 3] {
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let (depth_samples, drawn, color, depth) = (fine.depth_view(), view(&fine.centre_color), view(&target.color), view(&target.depth));
+        let lines = view(&fine.lines);
+        let bind = |layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry<'_>]| {
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.resolve"), layout, entries })
+        };
+        let reach = |from: &wgpu::Buffer, to: &wgpu::Buffer| {
+            let entries =
+                [entry(0, from.as_entire_binding()), entry(1, to.as_entire_binding()), entry(2, fine.tile_layout.as_entire_binding())];
+            bind(&self.reach_layout, &entries)
+        };
+        [
+            bind(
+                &self.layout,
+                &[
+                    entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
+                    entry(1, wgpu::BindingResource::TextureView(&drawn)),
+                    entry(2, wgpu::BindingResource::TextureView(&color)),
+                    entry(3, wgpu::BindingResource::TextureView(&depth)),
+                    entry(4, fine.within_reach.as_entire_binding()),
+                    entry(5, fine.layout.as_entire_binding()),
+                    entry(6, wgpu::BindingResource::TextureView(&lines)),
+                ],
+            ),
+            reach(&fine.within_reach, &fine.within_rows),
+            reach(&fine.within_rows, &fine.within_reach),
+        ]
+    }
+}
+
+fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {
+    wgpu::BindGroupEntry { binding, resource }
 }

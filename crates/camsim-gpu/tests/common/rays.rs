@@ -10,7 +10,10 @@ use camsim_core::{
     pose::CameraPose,
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
-    temporal::edges::{FineImage, FineSample},
+    temporal::{
+        edges::{Centre, FineImage},
+        lines::EdgeLine,
+    },
 };
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -118,30 +121,46 @@ pub fn black_ground_and_roof() -> Scene {
     scene
 }
 
-/// A supersampled ideal frame of a plan by rays cast in f64; meshes only.
-pub fn fine_samples(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, scale: u32) -> Vec<FineSample> {
-    let [width, height] = plan.ideal.size_px.map(|side| side * scale);
-    let camera_from_ned = key.ned_from_camera.inverse();
-    (0..width * height)
-        .into_par_iter()
-        .flat_map_iter(|i| {
-            FineImage::SAMPLE_PLACES.map(|place| (DVec2::new(f64::from(i % width), f64::from(i / width)) + place) / f64::from(scale) - 0.5)
-        })
-        .map(|at_px| {
-            let ray = key.ned_from_camera * ((at_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
-            let origin = key.position_ned_m;
-            let mut hits = sequence
-                .scene
-                .meshes
-                .iter()
-                .filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY))
-                .map(|hit| hit.0)
-                .collect::<Vec<_>>();
-            hits.sort_by(f64::total_cmp);
-            let depth_m = hits.first().map(|&t| (camera_from_ned * (t * ray)).z);
-            FineSample { inverse_depth: depth_m.map_or(0.0, |z| 1.0 / z), color: cast(&sequence.scene, origin, ray).0 }
-        })
-        .collect()
+/// An ideal frame with supersampled depth by rays cast in f64; meshes only.
+pub struct CastFrame {
+    pub size_px: [u32; 2],
+    pub scale: u32,
+    pub samples: Vec<f64>,
+    pub centres: Vec<Centre>,
+    pub lines: Vec<Option<EdgeLine>>,
+}
+
+impl CastFrame {
+    pub fn new(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, scale: u32) -> Self {
+        let size_px = plan.ideal.size_px;
+        let corners = |[width, height]: [u32; 2]| {
+            (0..width * height).into_par_iter().map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
+        };
+        let samples: Vec<f64> = corners(size_px.map(|side| side * scale))
+            .flat_map_iter(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5))
+            .map(|at_px| look(sequence, plan, key, at_px).inverse_depth)
+            .collect();
+        let centres = corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
+        let lines = FineImage::lines_of(size_px, scale, &samples);
+        Self { size_px, scale, samples, centres, lines }
+    }
+
+    pub fn image(&self) -> FineImage<'_> {
+        FineImage { size_px: self.size_px, scale: self.scale, samples: &self.samples, centres: &self.centres, lines: &self.lines }
+    }
+
+    pub fn nearest_w(&self) -> f64 {
+        self.samples.iter().copied().fold(0.0, f64::max)
+    }
+}
+
+fn look(sequence: &Sequence, plan: &FramePlan, key: &CameraPose, at_px: DVec2) -> Centre {
+    let ray = key.ned_from_camera * ((at_px - plan.ideal.principal_px) / plan.ideal.focal_px).extend(1.0);
+    let origin = key.position_ned_m;
+    let hits = sequence.scene.meshes.iter().filter_map(|mesh| mesh.intersect(origin, ray, f64::INFINITY)).map(|hit| hit.0);
+    let first = hits.min_by(f64::total_cmp);
+    let depth_m = first.map(|t| (key.ned_from_camera.inverse() * (t * ray)).z);
+    Centre { inverse_depth: depth_m.map_or(0.0, |z| 1.0 / z), color: cast(&sequence.scene, origin, ray).0 }
 }
 
 /// PSNR of a frame at these pixels, linear values, full scale 1.
