@@ -12,7 +12,7 @@
 @group(0) @binding(4) var<storage, read_write> tiles: array<u32>;
 // Ideal pixels of a frame, and rows from one to the next; w is not used.
 @group(0) @binding(5) var<uniform> ideal_layout: vec4<u32>;
-// Borders of surfaces within fine pixels.
+// Borders of surfaces within fine pixels; written, and to be read, in marked pixels only.
 @group(0) @binding(6) var lines: texture_storage_2d<rg32uint, write>;
 
 // A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
@@ -95,9 +95,6 @@ fn resolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id
         }
         textureStore(color, pixel, vec4<f32>(textureLoad(centre_color, pixel, 0).rgb, select(1.0, 0.0, edge)));
         textureStore(depth, pixel, vec4<f32>(surface));
-        for (var i = 0; i < scale * scale; i++) {
-            textureStore(lines, pixel * scale + vec2<i32>(i % scale, i / scale), vec4<u32>(0u));
-        }
         if (edge) {
             marked[atomicAdd(&marked_count, 1u)] = local.x + 8u * local.y;
         }

@@ -9,41 +9,38 @@
 #import <slot:depth>
 #import <slot:temporal_inverse>
 #import <slot:gather>
-#import <slot:edges>
+#import reverse/edges/seen.wgsl
 #import reverse/photometric.wgsl
 #import <slot:color>
 #import <slot:emit>
+#import <slot:edges>
 
 @compute @workgroup_size(8, 8)
-fn reverse(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
     let pixel = id.xy;
-    let in_picture = all(pixel < frame.size_px);
-    var ray = Ray();
-    var gathered = Gathered(vec4<f32>(0.0), true);
-    var weight = 0.0;
-    var needed = false;
-    if (in_picture) {
-        ray = lens_ray(pixel);
-        if (ray.valid) {
-            weight = vignette_weight(pixel);
-        }
-        if (weight > 0.0) {
-            use_key_of_line(pixel);
-            gathered = gather(pixel, ray);
-            needed = needs_rays(pixel, ray, gathered);
-        }
-    }
-    // By all threads together.
-    let seen = cast_rays(thread, pixel, ray, needed);
-    if (!in_picture) {
+    if (pixel.x >= frame.size_px.x || pixel.y >= frame.size_px.y) {
         return;
     }
-    if (needed) {
-        gathered.color = vec4<f32>(seen, 1.0);
-    }
-    if (!ray.valid || !gathered.inside) {
+    let ray = lens_ray(pixel);
+    if (!ray.valid) {
         emit_invalid(pixel);
         return;
     }
-    emit(pixel, ray, output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)));
+    let weight = vignette_weight(pixel);
+    var gathered = Gathered(vec4<f32>(0.0), true);
+    use_key_of_line(pixel);
+    if (weight > 0.0) {
+        gathered = gather(pixel, ray);
+    }
+    if (!gathered.inside) {
+        emit_invalid(pixel);
+        return;
+    }
+    if (weight > 0.0) {
+        list_for_rays(pixel, ray, gathered);
+    }
+    emit(pixel, output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)));
+    if (EMITS_RAYS) {
+        emit_truth(pixel, ray, smooth_px_at_phase(pixel, ray, frame.coords_phase), smooth_mid(pixel, ray));
+    }
 }

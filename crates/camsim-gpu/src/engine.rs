@@ -24,7 +24,7 @@ use crate::{
     ideal::{IdealPass, IdealSlot, IdealTarget, STORED_FORMAT},
     layout::{FrameUniforms, Truth},
     recorder::{PassClock, PassTime, Recorder},
-    reverse::{PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
+    reverse::{EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass, list_size},
     shaders::ComposeError,
     upload::SceneBuffers,
 };
@@ -138,6 +138,7 @@ impl Engine {
             targets: Vec::new(),
             drawn: None,
             slots,
+            listed: None,
             buffers,
             planner,
             engine: self,
@@ -182,6 +183,8 @@ pub struct Session<'a> {
     targets: Vec<IdealTarget>,
     drawn: Option<Drawn>,
     slots: Vec<Slot>,
+    /// Pixels of the frame at work that may see silhouettes, for frames that have any.
+    listed: Option<wgpu::Buffer>,
     vignette: wgpu::Buffer,
     noise_table: wgpu::Buffer,
     coords_phase: f32,
@@ -264,6 +267,15 @@ fn pose_buffer(gpu: &GpuContext, size: u64) -> wgpu::Buffer {
         label: Some("camsim.poses"),
         size,
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}
+
+fn list_buffer(gpu: &GpuContext, size_px: [u32; 2]) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.listed"),
+        size: list_size(size_px),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }
@@ -465,7 +477,13 @@ impl Session<'_> {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let Some(target) = self.drawn.as_ref().map(|drawn| &self.targets[drawn.target]) else { return Ok(()) };
         let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| view(map)) } else { None };
+        let listed = (plan.edges != EdgeStage::None).then(|| {
+            let listed = self.listed.get_or_insert_with(|| list_buffer(gpu, plan.camera.size_px));
+            gpu.queue.write_buffer(listed, 0, bytemuck::cast_slice(&EMPTY_LIST));
+            &*listed
+        });
         let bindings = ReverseBindings {
+            listed,
             frame: &slot.frame,
             noise_table: &self.noise_table,
             color: &target.color_view(),

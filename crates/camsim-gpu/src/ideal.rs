@@ -108,8 +108,8 @@ pub struct IdealPass {
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
     plain: SurfacePipelines,
-    /// Depth alone, for supersampled frames.
-    fine: SurfacePipelines,
+    /// For supersampled frames: depth alone, and with colour.
+    fine: [SurfacePipelines; 2],
 }
 
 /// What draws surfaces to a target of a given number of samples.
@@ -161,7 +161,8 @@ impl IdealPass {
                 mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples, format)?,
             })
         };
-        let (plain, fine) = (pipelines(1, Some(color_format(preset)))?, pipelines(FINE_SAMPLES, None)?);
+        let (plain, fine) =
+            (pipelines(1, Some(color_format(preset)))?, [pipelines(FINE_SAMPLES, None)?, pipelines(FINE_SAMPLES, Some(COLOR_FORMAT))?]);
         Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
     }
 
@@ -226,14 +227,7 @@ impl IdealPass {
     ) -> LodSelection {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
-        let [r, g, b] = scene.sky_linear.map(f64::from);
         let (color_view, depth_view) = (view(color), view(depth));
-        let color = wgpu::RenderPassColorAttachment {
-            view: &color_view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
-        };
         let mut middle_lod = LodSelection::default();
         let mut draws = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
@@ -249,13 +243,15 @@ impl IdealPass {
                 middle_lod = lod;
             }
         }
-        let mut pass = recorder.render_pass("ideal", Some(color), depth_attachment(&depth_view));
+        let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), depth_attachment(&depth_view));
         self.draw_keys(&mut pass, &self.plain, plan, 1, buffers, &draws);
         drop(pass);
         if let Some(fine) = &target.fine {
             let depth_view = fine.depth_view();
-            let mut pass = recorder.render_pass("ideal_fine", None, depth_attachment(&depth_view));
-            self.draw_keys(&mut pass, &self.fine, plan, fine.scale, buffers, &draws);
+            let color_view = fine.color.as_ref().map(view);
+            let color = color_view.as_ref().map(|view| color_attachment(view, scene));
+            let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&depth_view));
+            self.draw_keys(&mut pass, &self.fine[usize::from(fine.color.is_some())], plan, fine.scale, buffers, &draws);
             drop(pass);
             self.resolve.encode(gpu, recorder, plan, target, fine);
         }
@@ -372,6 +368,17 @@ fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, sl
         pass.set_vertex_buffer(0, mesh.vertices.slice(..));
         pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(0..mesh.count, 0, 0..1);
+    }
+}
+
+/// Linear colour, cleared to the sky's.
+fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::RenderPassColorAttachment<'a> {
+    let [r, g, b] = scene.sky_linear.map(f64::from);
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store: wgpu::StoreOp::Store },
     }
 }
 

@@ -26,6 +26,8 @@ pub mod lens_inverse;
 
 /// The kernel's main file.
 pub const SHADER: &str = "reverse/reverse.wgsl";
+/// The kernel of the pixels that it lists, where silhouettes can be in view.
+pub const RAYS_SHADER: &str = "reverse/rays.wgsl";
 /// Edge of the square workgroups.
 const WORKGROUP_PX: u32 = 8;
 
@@ -59,6 +61,27 @@ impl From<TapStage> for TapKind {
     }
 }
 
+/// Rays of their own at silhouettes, without their numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum EdgeKind {
+    /// None.
+    None,
+    /// Samples of depth, colours of pixels.
+    Centres,
+    /// Samples of depth and colour.
+    Samples,
+}
+
+impl From<EdgeStage> for EdgeKind {
+    fn from(stage: EdgeStage) -> Self {
+        match stage {
+            EdgeStage::None => Self::None,
+            EdgeStage::Supersampled { scale: 1, .. } => Self::Centres,
+            EdgeStage::Supersampled { .. } => Self::Samples,
+        }
+    }
+}
+
 /// Which stages a kernel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PipelineKey {
@@ -75,7 +98,7 @@ pub struct PipelineKey {
     /// More than one ideal frame.
     pub keys: bool,
     /// Rays of their own at silhouettes.
-    pub edges: bool,
+    pub edges: EdgeKind,
     /// Depth and coordinates beside the picture.
     pub truth: bool,
     /// The paper preset: stored values, straight blur, nearest depth.
@@ -100,7 +123,7 @@ impl PipelineKey {
             one_depth: plan.blur.is_some_and(|blur| blur.one_depth),
             tap: plan.taps.into(),
             keys: plan.keys.len() > 1,
-            edges: plan.edges != EdgeStage::None,
+            edges: plan.edges.into(),
             truth: plan.truth,
             paper: plan.preset == Preset::Paper,
         }
@@ -120,7 +143,10 @@ impl PipelineKey {
                     }
                     // Without parallax all key cameras see the same.
                     let parallax = temporal == TemporalKind::Reproject;
-                    for (several, edges) in [(false, false), (false, true), (true, false), (true, true)] {
+                    for (several, edges) in [false, true]
+                        .into_iter()
+                        .flat_map(|several| [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (several, edges)))
+                    {
                         if several && !parallax {
                             continue;
                         }
@@ -153,7 +179,7 @@ impl PipelineKey {
                     one_depth: false,
                     tap: TapKind::Bilinear,
                     keys: false,
-                    edges: false,
+                    edges: EdgeKind::None,
                     truth,
                     paper: true,
                 }));
@@ -164,7 +190,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 10] {
+    pub fn slots(&self) -> [Slot; 11] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -192,7 +218,11 @@ impl PipelineKey {
             false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
             true => ("reverse/depth/nearest.wgsl", "reverse/color/stored.wgsl"),
         };
-        let edges = if self.edges { "reverse/edges/supersampled.wgsl" } else { "reverse/edges/none.wgsl" };
+        let edges = if self.edges == EdgeKind::None { "reverse/edges/none.wgsl" } else { "reverse/edges/listed.wgsl" };
+        let surface_color = match self.edges {
+            EdgeKind::Samples => "reverse/edges/color/samples.wgsl",
+            EdgeKind::None | EdgeKind::Centres => "reverse/edges/color/centres.wgsl",
+        };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
             ("keys", keys),
@@ -203,6 +233,7 @@ impl PipelineKey {
             ("nodes", if self.one_depth { "reverse/gather/nodes/one_depth.wgsl" } else { "reverse/gather/nodes/own_depth.wgsl" }),
             ("tap", tap),
             ("edges", edges),
+            ("surface_color", surface_color),
             ("color", color),
             ("emit", emit),
         ]
@@ -232,6 +263,17 @@ pub struct ReverseBindings<'a> {
     pub out_color: &'a wgpu::Buffer,
     /// Depth and coordinates, when the key writes them.
     pub out_truth: Option<&'a wgpu::Buffer>,
+    /// Listed pixels, when the key lists any: [`list_size`] bytes, the first four words of them [`EMPTY_LIST`].
+    pub listed: Option<&'a wgpu::Buffer>,
+}
+
+/// Head of the list of pixels before a frame: arguments of an empty dispatch, and no pixel.
+pub const EMPTY_LIST: [u32; 4] = [0, 1, 1, 0];
+
+/// Bytes for a list of all pixels of a picture.
+#[must_use]
+pub fn list_size(size_px: [u32; 2]) -> u64 {
+    4 * (EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]))
 }
 
 #[derive(Debug)]
@@ -240,10 +282,17 @@ struct Variant {
     groups: [Option<wgpu::BindGroupLayout>; 4],
 }
 
+/// The kernels of a frame: the picture's, and its silhouettes'.
+#[derive(Debug)]
+struct Kernels {
+    picture: Variant,
+    silhouettes: Option<Variant>,
+}
+
 /// Kernels, compiled when first needed.
 #[derive(Debug)]
 pub struct ReversePass {
-    variants: HashMap<PipelineKey, Variant>,
+    variants: HashMap<PipelineKey, Kernels>,
     sampler: wgpu::Sampler,
 }
 
@@ -272,27 +321,31 @@ impl ReversePass {
         size_px: [u32; 2],
         bindings: &ReverseBindings<'_>,
     ) -> Result<(), ComposeError> {
-        let variant = match self.variants.entry(key) {
+        let kernels = match self.variants.entry(key) {
             Entry::Occupied(compiled) => compiled.into_mut(),
-            Entry::Vacant(first_use) => first_use.insert(Variant::new(gpu, key)?),
+            Entry::Vacant(first_use) => first_use.insert(Kernels {
+                picture: Variant::new(gpu, key, SHADER, "reverse", false)?,
+                silhouettes: (key.edges != EdgeKind::None).then(|| Variant::new(gpu, key, RAYS_SHADER, "rays", true)).transpose()?,
+            }),
         };
-        let groups = variant.bind(gpu, &self.sampler, bindings);
         let mut pass = recorder.compute_pass("reverse");
-        pass.set_pipeline(&variant.pipeline);
-        for (i, group) in groups.iter().enumerate() {
-            if let Some(group) = group {
-                pass.set_bind_group(i as u32, group, &[]);
-            }
-        }
+        kernels.picture.set(gpu, &mut pass, &self.sampler, bindings);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
+        drop(pass);
+        if let (Some(variant), Some(listed)) = (&kernels.silhouettes, bindings.listed) {
+            let mut pass = recorder.compute_pass("rays");
+            variant.set(gpu, &mut pass, &self.sampler, bindings);
+            pass.dispatch_workgroups_indirect(listed, 0);
+        }
         Ok(())
     }
 }
 
 impl Variant {
-    fn new(gpu: &GpuContext, key: PipelineKey) -> Result<Self, ComposeError> {
-        let module = shaders::module(&gpu.device, "camsim.reverse", SHADER, &key.slots())?;
-        let groups = layouts(key).map(|entries| {
+    /// `reads_list`: the list of pixels is there to be read, not to be made.
+    fn new(gpu: &GpuContext, key: PipelineKey, file: &str, entry_point: &str, reads_list: bool) -> Result<Self, ComposeError> {
+        let module = shaders::module(&gpu.device, "camsim.reverse", file, &key.slots())?;
+        let groups = layouts(key, reads_list).map(|entries| {
             (!entries.is_empty()).then(|| {
                 gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.reverse"), entries: &entries })
             })
@@ -306,11 +359,20 @@ impl Variant {
             label: Some("camsim.reverse"),
             layout: Some(&layout),
             module: &module,
-            entry_point: Some("reverse"),
+            entry_point: Some(entry_point),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
         Ok(Self { pipeline, groups })
+    }
+
+    fn set(&self, gpu: &GpuContext, pass: &mut wgpu::ComputePass<'_>, sampler: &wgpu::Sampler, bindings: &ReverseBindings<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        for (group, i) in self.bind(gpu, sampler, bindings).iter().zip(0..) {
+            if let Some(group) = group {
+                pass.set_bind_group(i, group, &[]);
+            }
+        }
     }
 
     fn bind(&self, gpu: &GpuContext, sampler: &wgpu::Sampler, b: &ReverseBindings<'_>) -> [Option<wgpu::BindGroup>; 4] {
@@ -328,12 +390,15 @@ impl Variant {
             vec![(0, b.out_color.as_entire_binding())],
         ];
         let whole = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let fine = b.fine.map(|fine| (whole(&fine.centre_depth), fine.depth_view(), whole(&fine.lines), &fine.within_reach));
+        let fine = b.fine.map(|fine| {
+            (whole(fine.color.as_ref().unwrap_or(&fine.centre_depth)), fine.depth_view(), whole(&fine.lines), &fine.within_reach)
+        });
         if let Some((centre, depth, lines, within_reach)) = &fine {
             resources[1].extend([(5, view(centre)), (6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
+        resources[3].extend(b.listed.map(|listed| (2, listed.as_entire_binding())));
         let mut groups = [const { None }; 4];
         for (i, resources) in resources.into_iter().enumerate() {
             groups[i] = self.groups[i].as_ref().map(|layout| {
@@ -345,7 +410,7 @@ impl Variant {
     }
 }
 
-fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
+fn layouts(key: PipelineKey, reads_list: bool) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
@@ -359,11 +424,14 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
         entry(3, storage(true)),
         entry(4, storage(true)),
     ];
-    if key.edges {
+    if key.edges != EdgeKind::None {
         let samples =
             |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: true };
         ideal.extend([
-            entry(5, texture(wgpu::TextureSampleType::Depth)),
+            match key.edges {
+                EdgeKind::Samples => entry(5, samples(wgpu::TextureSampleType::Float { filterable: false })),
+                EdgeKind::None | EdgeKind::Centres => entry(5, texture(wgpu::TextureSampleType::Depth)),
+            },
             entry(6, samples(wgpu::TextureSampleType::Depth)),
             entry(7, texture(wgpu::TextureSampleType::Uint)),
             entry(8, storage(true)),
@@ -376,6 +444,9 @@ fn layouts(key: PipelineKey) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let mut out = vec![entry(0, storage(false))];
     if key.truth {
         out.push(entry(1, storage(false)));
+    }
+    if key.edges != EdgeKind::None {
+        out.push(entry(2, storage(reads_list)));
     }
     [frame, ideal, lens, out]
 }
@@ -449,7 +520,10 @@ mod tests {
 
     #[test]
     fn every_variant_is_valid_without_any_capability() {
-        let texts = PipelineKey::all().into_iter().map(|key| (format!("{key:?}"), shaders::compose(SHADER, &key.slots()).unwrap()));
+        let texts = PipelineKey::all().into_iter().flat_map(|key| {
+            let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, RAYS_SHADER] };
+            files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
+        });
         let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl", "ideal/resolve.wgsl", "ideal/reach.wgsl"]
             .map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
         for (name, text) in texts.chain(ideal) {
@@ -457,6 +531,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 320);
+        assert_eq!(PipelineKey::all().len(), 476);
     }
 }

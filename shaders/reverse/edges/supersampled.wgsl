@@ -2,22 +2,17 @@
 // the colour of the one surface of the ideal frame that it meets, so that surfaces never mix but by area and time.
 // Twin: camsim_core::temporal::edges.
 #import ideal/fine.wgsl
-#import reverse/edges/seen.wgsl
+#import reverse/edges/near.wgsl
+#import <slot:surface_color>
 
-// Depth value at the middle of each ideal pixel, where its colour is.
-@group(1) @binding(5) var centre_depth: texture_depth_2d;
 @group(1) @binding(6) var fine_depth: texture_depth_multisampled_2d;
-// Borders of two surfaces within fine pixels: see ideal/lines.wgsl.
+// Borders of two surfaces within the fine pixels of marked pixels: see ideal/lines.wgsl.
 @group(1) @binding(7) var fine_lines: texture_2d<u32>;
-// A word for each 8x8 ideal pixels, made by ideal/reach.wgsl: what is within reach of a ray that would come from there were it infinitely far.
-// The bits of the largest depth value, the lowest one replaced by whether there is a marked pixel.
-@group(1) @binding(8) var<storage, read> within_reach: array<u32>;
 
 // Golden ratio: multiples are even over an interval for any number of them.
 const GOLDEN: f32 = 0.6180339887;
-// Looks along the parallax of a ray: their distance in ideal pixels, and how many at most.
+// Distance of two looks along the parallax of a ray, ideal pixels, while they are no more than MAX_LOOKS.
 const LOOK_PX: f32 = 0.5;
-const MAX_LOOKS: u32 = 128u;
 // Halvings of the distance in which a ray stops being free.
 const HALVINGS: u32 = 5u;
 // A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
@@ -26,10 +21,6 @@ const GAP_PX: f32 = 0.1;
 const PLAIN_PX: f32 = 0.25;
 // Depths that agree to within this, in the same measure, are of one surface.
 const SAME_PX: f32 = 0.25;
-// Depths of four pixels this near to each other, relative to the nearest, are of one surface.
-const SURFACE_STEP: f32 = 0.005;
-// Bilinear weight from which pixels of the same surface give its colour.
-const LEAST_WEIGHT: f32 = 1e-3;
 
 struct FineSample {
     texel: vec2<i32>,
@@ -45,7 +36,10 @@ fn fine_sample(at_px: vec2<f32>) -> FineSample {
     let half = vec2<i32>(2.0 * (at - corner));
     let texel = vec2<i32>(corner) + vec2<i32>(0, key_row() * i32(frame.edge_scale));
     let quarter = half.x + 2 * half.y;
-    let line = textureLoad(fine_lines, texel, 0).xy;
+    var line = vec2<u32>(0u);
+    if (textureLoad(ideal_color, texel / i32(frame.edge_scale), 0).a < 1.0) {
+        line = textureLoad(fine_lines, texel, 0).xy;
+    }
     if (line.x == 0u) {
         return FineSample(texel, quarter);
     }
@@ -83,92 +77,12 @@ fn fine_inverse_depth(at_px: vec2<f32>) -> f32 {
     return textureLoad(fine_depth, s.texel, s.index) / frame.near_m;
 }
 
-// Colour of the surface that is seen at a place: bilinear between the pixels around it that show the same surface as the place's sample;
-// where none does, that of the nearest in depth of the sixteen around it.
-fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
-    let s = fine_sample(at_px);
-    let depth = textureLoad(fine_depth, s.texel, s.index);
-    let last = vec2<f32>(frame.ideal_size_px) - 1.0;
-    let at = clamp(at_px, vec2<f32>(0.0), last);
-    let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
-    let t = at - base;
-    let first = vec2<i32>(0, key_row());
-    let b = first + vec2<i32>(base);
-    let top = min(b + 1, first + vec2<i32>(last));
-    let around = vec4<f32>(
-        textureLoad(centre_depth, b, 0),
-        textureLoad(centre_depth, vec2<i32>(top.x, b.y), 0),
-        textureLoad(centre_depth, vec2<i32>(b.x, top.y), 0),
-        textureLoad(centre_depth, top, 0),
-    );
-    let high = max(max(max(around.x, around.y), max(around.z, around.w)), depth);
-    let low = min(min(min(around.x, around.y), min(around.z, around.w)), depth);
-    let between = select(0.5 * (low + high), -1.0, low >= (1.0 - SURFACE_STEP) * high);
-    let same = (around > vec4<f32>(between)) == vec4<bool>(depth > between);
-    let weights = select(vec4<f32>(0.0), vec4<f32>((1.0 - t.x) * (1.0 - t.y), t.x * (1.0 - t.y), (1.0 - t.x) * t.y, t.x * t.y), same);
-    let weight = dot(weights, vec4<f32>(1.0));
-    if (weight > LEAST_WEIGHT) {
-        let sum = weights.x * textureLoad(ideal_color, b, 0).rgb
-            + weights.y * textureLoad(ideal_color, vec2<i32>(top.x, b.y), 0).rgb
-            + weights.z * textureLoad(ideal_color, vec2<i32>(b.x, top.y), 0).rgb
-            + weights.w * textureLoad(ideal_color, top, 0).rgb;
-        return sum / weight;
-    }
-    var best = b;
-    var least = 1e30;
-    for (var i = 0; i < 16; i++) {
-        let texel = clamp(b + vec2<i32>(i % 4 - 1, i / 4 - 1), first, first + vec2<i32>(last));
-        let off = abs(textureLoad(centre_depth, texel, 0) - depth);
-        if (off < least) {
-            least = off;
-            best = texel;
-        }
-    }
-    return textureLoad(ideal_color, best, 0).rgb;
-}
-
-// What a ray may meet that comes from here if it is infinitely far.
-fn reach_of(far_px: vec2<f32>) -> u32 {
-    let at = vec2<u32>(clamp(far_px + 0.5, vec2<f32>(0.0), vec2<f32>(frame.ideal_size_px) - 1.0)) + vec2<u32>(0u, u32(key_row()));
-    return within_reach[(at.y / 8u) * ((textureDimensions(ideal_color).x + 7u) / 8u) + at.x / 8u];
-}
-
-// Of the nearest surface within reach, as a line's own camera sees it.
-fn nearest_inverse_depth(uv: vec2<f32>, pose: Pose, reach: u32) -> f32 {
-    let in_key = 1.02 * bitcast<f32>(reach & 0xfffffffeu) / frame.near_m;
-    // A camera that all but reaches the surface would stretch the search without end.
-    return min(line_inverse_depth(uv, pose, in_key), 4.0 * in_key);
-}
-
-// Whether a stretch of the ideal frame passes a silhouette.
-fn passes_edge(a_px: vec2<f32>, b_px: vec2<f32>) -> bool {
-    let looks = clamp(u32(ceil(distance(a_px, b_px))), 1u, MAX_LOOKS);
-    for (var i = 0u; i <= looks; i++) {
-        if (ideal_color_at(mix(a_px, b_px, f32(i) / f32(looks))).a < 1.0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 // Ray i of `frame.edge_samples`: place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
 fn ray_place(i: u32) -> vec3<f32> {
     let step = 1.0 / f32(frame.edge_samples);
     let x = (f32(i) + 0.5) * step;
     let y = f32(reverseBits(i) >> 8u) / 16777216.0 + 0.5 * step;
     return vec3<f32>(x - 0.5, y - 0.5, fract(GOLDEN * (f32(i) + 0.5)));
-}
-
-// Whether the pixel's rays of one pose may meet several surfaces: their parallax passes a silhouette.
-fn near_edge(uv: vec2<f32>, pose: Pose) -> bool {
-    let far = point_at(uv, pose, 0.0);
-    let far_px = ideal_px_from_point(far);
-    let reach = reach_of(far_px);
-    if (far.z <= 0.0 || (reach & 1u) == 0u) {
-        return false;
-    }
-    let near = point_at(uv, pose, nearest_inverse_depth(uv, pose, reach));
-    return near.z > 0.0 && passes_edge(ideal_px_from_point(near), far_px);
 }
 
 // Pose in the chosen key at a share of the exposure; nodes are equally far apart in time.
@@ -203,50 +117,13 @@ fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
     return true;
 }
 
-// Whether what the plain gather took does not stand.
-fn needs_rays(pixel: vec2<u32>, ray: Ray, plain: Gathered) -> bool {
-    // Above 1 where a mark lies under a negative weight of the spline.
-    return abs(plain.color.a - 1.0) > 1e-4 || (HAS_PARALLAX && !sees_one_surface(pixel, ray));
-}
-
-// Pixels of the workgroup that need rays, as numbers of their threads; what their rays start from; and the colours of 64 rays.
-var<workgroup> asking: array<u32, 64>;
-var<workgroup> asking_rays: array<Ray, 64>;
-var<workgroup> asking_count: atomic<u32>;
-var<workgroup> ray_colors: array<vec3<f32>, 64>;
-
-// The mean colour of the rays of each pixel that needs some. Such pixels are few and lie in strips: their rays are dealt out to all threads
-// of the workgroup, which keeps a processor's lanes busy. Every thread calls it, with its pixel and whether that needs rays.
-fn cast_rays(thread: u32, pixel: vec2<u32>, ray: Ray, needed: bool) -> vec3<f32> {
-    var place = 0u;
-    if (needed) {
-        place = atomicAdd(&asking_count, 1u);
-        asking[place] = thread;
-        asking_rays[place] = ray;
-    }
-    workgroupBarrier();
-    let first_pixel = pixel - vec2<u32>(thread % 8u, thread / 8u);
-    let rays = atomicLoad(&asking_count) * frame.edge_samples;
+// Mean colour of the pixel's rays.
+fn rays_color(pixel: vec2<u32>, ray: Ray) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var begin = 0u; begin < rays; begin += 64u) {
-        let i = begin + thread;
-        if (i < rays) {
-            let which = i / frame.edge_samples;
-            let its_pixel = first_pixel + vec2<u32>(asking[which] % 8u, asking[which] / 8u);
-            let its_ray = asking_rays[which];
-            let at = ray_place(i % frame.edge_samples);
-            let found = first_surface_of_keys(its_pixel, its_ray.uv + at.x * its_ray.d_dx + at.y * its_ray.d_dy, at.z);
-            ray_colors[thread] = surface_color_at(found.at_px);
-        }
-        workgroupBarrier();
-        if (needed) {
-            // Its own rays among these, in their order.
-            let last = min((place + 1u) * frame.edge_samples, begin + 64u);
-            for (var k = max(place * frame.edge_samples, begin); k < last; k++) {
-                sum += ray_colors[k - begin];
-            }
-        }
-        workgroupBarrier();
+    for (var i = 0u; i < frame.edge_samples; i++) {
+        let place = ray_place(i);
+        let found = first_surface_of_keys(pixel, ray.uv + place.x * ray.d_dx + place.y * ray.d_dy, place.z);
+        sum += surface_color_at(found.at_px);
     }
     use_key_of_line(pixel);
     return sum / f32(frame.edge_samples);

@@ -16,12 +16,13 @@ struct Truth {
 
 @group(3) @binding(1) var<storage, read_write> out_truth: array<Truth>;
 
-fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {
-    let i = pixel.y * frame.size_px.x + pixel.x;
-    out_color[i] = vec4<f32>(color, 1.0);
-    var truth = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
-    truth.source_px = seen_px_at_phase(pixel, ray, frame.coords_phase);
-    let mid = seen_mid(pixel, ray);
+fn emit(pixel: vec2<u32>, color: vec3<f32>) {
+    out_color[pixel.y * frame.size_px.x + pixel.x] = vec4<f32>(color, 1.0);
+}
+
+// `source_px` at `frame.coords_phase`, `mid` at mid-exposure.
+fn emit_truth(pixel: vec2<u32>, ray: Ray, source_px: vec2<f32>, mid: Seen) {
+    var truth = Truth(ray.uv, source_px, vec3<f32>(0.0), 0.0);
     if (mid.inverse_depth > 0.0 && mid.point.w > 0.0) {
         truth.depth_m = 1.0 / mid.inverse_depth;
         // On the key ray of the source, at the depth found there: no absolute pose is differenced in f32.
@@ -29,7 +30,7 @@ fn emit(pixel: vec2<u32>, ray: Ray, color: vec3<f32>) {
         truth.point_ned_m = frame.key_position_ned_m.xyz
             + p.x * frame.ned_from_key_x.xyz + p.y * frame.ned_from_key_y.xyz + p.z * frame.ned_from_key_z.xyz;
     }
-    out_truth[i] = truth;
+    out_truth[pixel.y * frame.size_px.x + pixel.x] = truth;
 }
 
 fn emit_invalid(pixel: vec2<u32>) {

@@ -22,8 +22,8 @@ const FACING_MARGIN: f64 = 0.95;
 const IGNORED_DN: f64 = 16.0;
 /// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4 samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is 0.5/255 over the picture.
 const COARSE_DN: f64 = 1.0;
-/// Depth of 4 samples, and the border between them.
-pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 4 + 8;
+/// Depth of 4 samples and the border between them, and with more than one fine pixel a pixel the colours of the samples.
+pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 4 + 8 + 4 * 8;
 /// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead of 9.
 const MAX_FINE_BYTES: u64 = 512 << 20;
 /// A flat mesh with more corners than this is not looked at any closer.
@@ -35,7 +35,7 @@ const MAX_FLAT_VERTICES: usize = 64;
 pub enum EdgeStage {
     /// No silhouette in view: one sample a pixel of the ideal frame.
     None,
-    /// The ideal frame keeps `4 scale^2` samples of depth a pixel, and an output pixel that sees a silhouette takes `samples` rays of its own.
+    /// The ideal frame keeps `4 scale^2` samples of depth a pixel (with `scale` above 1 of colour too), and an output pixel that sees a silhouette takes `samples` rays of its own.
     Supersampled {
         /// Fine pixels along a side of an ideal pixel, each with 4 samples.
         scale: u32,

@@ -23,8 +23,10 @@ pub const EDGE_STEP: f64 = 0.01;
 /// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another picture begins, bends less.
 pub const FINE_EDGE_STEP: f64 = 0.003;
 
-/// Depths of four pixels this near to each other, relative to the nearest, are of one surface.
+/// Depths this near to each other, relative to the nearer one, are of one surface.
 const SURFACE_STEP: f64 = 0.005;
+/// A slope has the mean of two depths half-way between their places; off by more than this share of their difference it is a step.
+const HALF_WAY: f64 = 0.35;
 
 /// Bilinear weight from which pixels of the same surface give its colour.
 const LEAST_WEIGHT: f64 = 1e-3;
@@ -48,6 +50,8 @@ pub struct FineImage<'a> {
     /// Inverse planar depth in the key camera, 1/m, 0 = sky: row-major fine pixels, four samples each, in the order of
     /// [`FineImage::SAMPLE_PLACES`].
     pub samples: &'a [f64],
+    /// Linear R G B of the samples; empty for frames whose colours are those of the pixels' middles alone.
+    pub sample_colors: &'a [DVec3],
     /// Row-major ideal pixels.
     pub centres: &'a [Centre],
     /// Borders within fine pixels, as [`FineImage::lines_of`] finds them; empty for none.
@@ -67,10 +71,15 @@ impl FineImage<'_> {
         (0..width * height).map(|i| edge_line([i % width, i / width], [width, height], &depth)).collect()
     }
 
-    /// Inverse depth (1/m) of the sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces
-    /// runs through the fine pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
+    /// Inverse depth (1/m) of the sample that stands for a position.
     #[must_use]
     pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
+        self.samples[self.sample(at_px)]
+    }
+
+    /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine
+    /// pixel, one of the surface on the position's side. Positions outside go to the border of the frame.
+    fn sample(&self, at_px: DVec2) -> usize {
         let size_px = self.size_px.map(|side| i64::from(side * self.scale));
         let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
         let at = (at_px + 0.5).clamp(DVec2::ZERO, last) * f64::from(self.scale);
@@ -79,12 +88,11 @@ impl FineImage<'_> {
         let quarter = half.x as usize + 2 * half.y as usize;
         let texel = [corner.x as i64, corner.y as i64];
         let index = |[x, y]: [i64; 2]| (y * size_px[0] + x) as usize;
-        let own = self.samples[4 * index(texel) + quarter];
+        let own = 4 * index(texel) + quarter;
         let Some(line) = self.lines.get(index(texel)).copied().flatten() else { return own };
         let nearer = line.normal.dot(at - corner - 0.5) > line.offset_px;
         let of_side = |texel: [i64; 2]| {
-            let samples = (0..4).map(|k| self.samples[4 * index(texel) + (quarter ^ k)]);
-            samples.into_iter().find(|&depth| (depth > line.between) == nearer)
+            (0..4).map(|k| 4 * index(texel) + (quarter ^ k)).find(|&sample| (self.samples[sample] > line.between) == nearer)
         };
         // None of the pixel's own: a corner of it that the border cuts off. The next pixel on that side has some.
         let towards = if nearer { line.normal } else { -line.normal };
@@ -92,10 +100,13 @@ impl FineImage<'_> {
         of_side(texel).or_else(|| of_side([beside(0), beside(1)])).unwrap_or(own)
     }
 
-    /// Linear R G B at a position of the surface that is seen there: bilinear between those of the four pixels around it that show the same
+    /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples have none, bilinear between those of the four pixels around it that show the same
     /// surface as [`FineImage::inverse_depth`] has; where none does, the nearest in depth of the sixteen around it.
     #[must_use]
     pub fn color(&self, at_px: DVec2) -> DVec3 {
+        if let Some(&color) = self.sample_colors.get(self.sample(at_px)) {
+            return color;
+        }
         let depth = self.inverse_depth(at_px);
         let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1.0;
         let at = at_px.clamp(DVec2::ZERO, last);
@@ -105,15 +116,18 @@ impl FineImage<'_> {
             let [x, y] = [base.x + f64::from(x), base.y + f64::from(y)];
             self.centres[(y.clamp(0.0, last.y) * (last.x + 1.0) + x.clamp(0.0, last.x)) as usize]
         };
-        let around = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
-            let weight = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
-            (centre(x, y), weight)
-        });
-        let high = around.iter().fold(depth, |high, (c, _)| high.max(c.inverse_depth));
-        let low = around.iter().fold(depth, |low, (c, _)| low.min(c.inverse_depth));
-        let between = if low >= (1.0 - SURFACE_STEP) * high { -1.0 } else { 0.5 * (low + high) };
-        let same = around.iter().filter(|(c, _)| (c.inverse_depth > between) == (depth > between));
-        let (sum, weight) = same.fold((DVec3::ZERO, 0.0), |(sum, total), (c, weight)| (sum + *weight * c.color, total + weight));
+        let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+        for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let Centre { inverse_depth: other, color } = centre(x, y);
+            let off = (other - depth).abs();
+            let half_way_px = 0.5 * (at + base + DVec2::new(f64::from(x), f64::from(y)));
+            let slopes = || (self.inverse_depth(half_way_px) - 0.5 * (other + depth)).abs() < HALF_WAY * off;
+            if off <= SURFACE_STEP * other.max(depth) || slopes() {
+                let share = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
+                sum += share * color;
+                weight += share;
+            }
+        }
         if weight > LEAST_WEIGHT {
             return sum / weight;
         }
@@ -330,7 +344,14 @@ mod tests {
 
     impl Drawn {
         fn image(&self) -> FineImage<'_> {
-            FineImage { size_px: IDEAL.size_px, scale: self.scale, samples: &self.samples, centres: &self.centres, lines: &[] }
+            FineImage {
+                size_px: IDEAL.size_px,
+                scale: self.scale,
+                samples: &self.samples,
+                sample_colors: &[],
+                centres: &self.centres,
+                lines: &[],
+            }
         }
     }
 

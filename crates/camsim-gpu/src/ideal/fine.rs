@@ -25,6 +25,8 @@ pub struct FineTarget {
     pub scale: u32,
     /// near / z, 4 samples a fine pixel.
     pub depth: wgpu::Texture,
+    /// Linear colour, 4 samples a fine pixel, where there is more than one a pixel: what is thinner than a pixel then has its own.
+    pub color: Option<wgpu::Texture>,
     /// Linear colour at the middle of each ideal pixel.
     pub centre_color: wgpu::Texture,
     /// near / z there.
@@ -88,6 +90,7 @@ impl FineTarget {
             within_reach: buffer("camsim.ideal.within_reach", 4 * tiles[0] * tiles[1], storage),
             within_rows: buffer("camsim.ideal.within_rows", 4 * tiles[0] * tiles[1], storage),
             depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
+            color: (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage)),
             centre_color: texture(gpu, "camsim.ideal.centre_color", ideal_px, COLOR_FORMAT, 1, usage),
             centre_depth: texture(gpu, "camsim.ideal.centre_depth", ideal_px, DEPTH_FORMAT, 1, usage),
         }

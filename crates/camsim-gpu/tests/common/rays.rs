@@ -126,6 +126,7 @@ pub struct CastFrame {
     pub size_px: [u32; 2],
     pub scale: u32,
     pub samples: Vec<f64>,
+    pub sample_colors: Vec<DVec3>,
     pub centres: Vec<Centre>,
     pub lines: Vec<Option<EdgeLine>>,
 }
@@ -136,17 +137,21 @@ impl CastFrame {
         let corners = |[width, height]: [u32; 2]| {
             (0..width * height).into_par_iter().map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)))
         };
-        let samples: Vec<f64> = corners(size_px.map(|side| side * scale))
+        let samples: Vec<Centre> = corners(size_px.map(|side| side * scale))
             .flat_map_iter(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5))
-            .map(|at_px| look(sequence, plan, key, at_px).inverse_depth)
+            .map(|at_px| look(sequence, plan, key, at_px))
             .collect();
+        // The renderer keeps colours of samples only where they are many.
+        let sample_colors = if scale > 1 { samples.iter().map(|sample| sample.color).collect() } else { Vec::new() };
+        let samples: Vec<f64> = samples.iter().map(|sample| sample.inverse_depth).collect();
         let centres = corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
         let lines = FineImage::lines_of(size_px, scale, &samples);
-        Self { size_px, scale, samples, centres, lines }
+        Self { size_px, scale, samples, sample_colors, centres, lines }
     }
 
     pub fn image(&self) -> FineImage<'_> {
-        FineImage { size_px: self.size_px, scale: self.scale, samples: &self.samples, centres: &self.centres, lines: &self.lines }
+        let Self { size_px, scale, samples, sample_colors, centres, lines } = self;
+        FineImage { size_px: *size_px, scale: *scale, samples, sample_colors, centres, lines }
     }
 
     pub fn nearest_w(&self) -> f64 {

@@ -1,0 +1,60 @@
+// Colours are known at the middles of pixels.
+
+// Depth value at the middle of each ideal pixel, where its colour is.
+@group(1) @binding(5) var centre_depth: texture_depth_2d;
+
+// Depths this near to each other, relative to the nearer one, are of one surface.
+const SURFACE_STEP: f32 = 0.005;
+// A slope has the mean of two depths half-way between their places; off by more than this share of their difference it is a step.
+const HALF_WAY: f32 = 0.35;
+// Bilinear weight from which pixels of the same surface give its colour.
+const LEAST_WEIGHT: f32 = 1e-3;
+
+// Whether a place whose sample has the depth value `depth` and a pixel with `other` show one surface: there is no step on the way.
+fn one_surface(at_px: vec2<f32>, depth: f32, pixel: vec2<f32>, other: f32) -> bool {
+    let off = abs(other - depth);
+    if (off <= SURFACE_STEP * max(other, depth)) {
+        return true;
+    }
+    let half_way = fine_sample(0.5 * (at_px + pixel));
+    return abs(textureLoad(fine_depth, half_way.texel, half_way.index) - 0.5 * (other + depth)) < HALF_WAY * off;
+}
+
+// Colour of the surface that is seen at a place: bilinear between the pixels around it that show the same surface as the place's sample;
+// where none does, that of the nearest in depth of the sixteen around it.
+fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
+    let s = fine_sample(at_px);
+    let depth = textureLoad(fine_depth, s.texel, s.index);
+    let last = vec2<f32>(frame.ideal_size_px) - 1.0;
+    let at = clamp(at_px, vec2<f32>(0.0), last);
+    let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
+    let t = at - base;
+    let first = vec2<i32>(0, key_row());
+    let b = first + vec2<i32>(base);
+    var sum = vec3<f32>(0.0);
+    var weight = 0.0;
+    for (var k = 0; k < 4; k++) {
+        let step = vec2<f32>(f32(k & 1), f32(k >> 1u));
+        let texel = min(b + vec2<i32>(step), first + vec2<i32>(last));
+        if (one_surface(at, depth, base + step, textureLoad(centre_depth, texel, 0))) {
+            let sides = mix(1.0 - t, t, step);
+            let share = sides.x * sides.y;
+            sum += share * textureLoad(ideal_color, texel, 0).rgb;
+            weight += share;
+        }
+    }
+    if (weight > LEAST_WEIGHT) {
+        return sum / weight;
+    }
+    var best = b;
+    var least = 1e30;
+    for (var i = 0; i < 16; i++) {
+        let texel = clamp(b + vec2<i32>(i % 4 - 1, i / 4 - 1), first, first + vec2<i32>(last));
+        let off = abs(textureLoad(centre_depth, texel, 0) - depth);
+        if (off < least) {
+            least = off;
+            best = texel;
+        }
+    }
+    return textureLoad(ideal_color, best, 0).rgb;
+}
