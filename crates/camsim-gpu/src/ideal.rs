@@ -4,14 +4,14 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, select_lod},
+    scene::{LodSelection, Scene, Terrain, TerrainDetail, TerrainMesh},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
 
 use crate::{
     context::GpuContext,
-    layout::{ChunkDraw, IdealCamera},
+    layout::{ChunkPlace, IdealCamera},
     recorder::Recorder,
     shaders::{self, ComposeError},
     upload::SceneBuffers,
@@ -32,6 +32,9 @@ pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Distance between the placements of two meshes in their buffer.
 const PLACEMENT_STRIDE: u64 = 256;
+
+/// Room for the indices of a few thousand triangles, bytes.
+const MIN_INDEX_BYTES: u64 = 1 << 16;
 
 /// Textures that an ideal frame is drawn to.
 #[derive(Debug)]
@@ -122,7 +125,9 @@ struct SurfacePipelines {
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
-    draws: wgpu::Buffer,
+    chunks: wgpu::Buffer,
+    /// Of the terrain's triangles; replaced by a larger one when a frame has more than any before.
+    indices: wgpu::Buffer,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     terrain_group: Option<wgpu::BindGroup>,
@@ -177,7 +182,8 @@ impl IdealPass {
         };
         let chunks = scene.terrain.as_ref().map_or(0, |terrain| terrain.chunks.len());
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let draws = create("camsim.ideal.draws", (chunks * size_of::<ChunkDraw>()) as u64, wgpu::BufferUsages::STORAGE);
+        let chunks = create("camsim.ideal.chunks", (chunks * size_of::<ChunkPlace>()) as u64, wgpu::BufferUsages::STORAGE);
+        let indices = index_buffer(gpu, 0);
         let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
@@ -192,7 +198,7 @@ impl IdealPass {
                     entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
                     entry(1, sampler.clone()),
                     entry(2, terrain.vertices.as_entire_binding()),
-                    entry(3, draws.as_entire_binding()),
+                    entry(3, chunks.as_entire_binding()),
                 ],
             )
         });
@@ -208,7 +214,7 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, draws, placements, camera_group, terrain_group, mesh_groups }
+        IdealSlot { camera, chunks, indices, placements, camera_group, terrain_group, mesh_groups }
     }
 
     /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
@@ -216,7 +222,7 @@ impl IdealPass {
         &self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        slots: &[IdealSlot],
+        slots: &mut [IdealSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
@@ -247,17 +253,19 @@ impl IdealPass {
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
         let focal_px = plan.ideal.focal_px.max_element();
         let mut middle_lod = LodSelection::default();
-        for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
+        for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
             gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let first_row = key_rows(&plan.ideal) * k as u32 * scale;
             pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(0, first_row, width, height);
             pass.set_bind_group(0, &slot.camera_group, &[]);
-            let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
-                select_lod(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px)
-            });
-            self.draw_terrain(gpu, &mut pass, pipelines, slot, scene, buffers, &lod, base_ned_m);
+            let mut lod = LodSelection::default();
+            if let Some(terrain) = &scene.terrain {
+                let mesh = TerrainDetail::new(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px).mesh();
+                draw_terrain(gpu, &mut pass, pipelines, slot, terrain, &mesh, base_ned_m);
+                lod = mesh.lod;
+            }
             self.draw_meshes(gpu, &mut pass, pipelines, slot, buffers, base_ned_m);
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
@@ -268,57 +276,6 @@ impl IdealPass {
             self.resolve.encode(gpu, recorder, plan, target, fine);
         }
         middle_lod
-    }
-
-    fn draw_terrain(
-        &self,
-        gpu: &GpuContext,
-        pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &SurfacePipelines,
-        slot: &IdealSlot,
-        scene: &Scene,
-        buffers: &SceneBuffers,
-        lod: &LodSelection,
-        base_ned_m: DVec3,
-    ) {
-        let (Some(terrain), Some(on_device), Some(group)) = (&scene.terrain, &buffers.terrain, &slot.terrain_group) else { return };
-        // Chunks of one level are drawn together; those with voids come last, one by one.
-        let mut order: Vec<_> = lod.draws.iter().collect();
-        order.sort_by_key(|draw| (terrain.chunks[draw.chunk as usize].void_indices.is_some(), draw.level, draw.chunk));
-        let rows: Vec<ChunkDraw> = order
-            .iter()
-            .map(|draw| {
-                let chunk = &terrain.chunks[draw.chunk as usize];
-                let [north, east, south, west] = draw.edge_levels.map(u32::from);
-                ChunkDraw {
-                    centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(),
-                    first_vertex: chunk.first_vertex,
-                    cells: chunk.cells,
-                    levels: u32::from(draw.level) | north << 4 | east << 8 | south << 12 | west << 16,
-                    pad: 0,
-                }
-            })
-            .collect();
-        gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
-        pass.set_pipeline(&pipelines.terrain);
-        pass.set_bind_group(1, group, &[]);
-        pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
-        let mut first = 0;
-        while let Some(draw) = order.get(first) {
-            let chunk = &terrain.chunks[draw.chunk as usize];
-            let (range, last) = match &chunk.void_indices {
-                Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
-                None => {
-                    let same = |d: &&camsim_core::scene::ChunkDraw| {
-                        d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none()
-                    };
-                    let count = order[first..].iter().take_while(|d| same(d)).count();
-                    (on_device.levels[draw.level as usize].clone(), first + count)
-                }
-            };
-            pass.draw_indexed(range, 0, first as u32..last as u32);
-            first = last;
-        }
     }
 
     fn draw_meshes(
@@ -343,6 +300,44 @@ impl IdealPass {
             pass.draw_indexed(0..mesh.count, 0, 0..1);
         }
     }
+}
+
+/// Draws a terrain's triangles, all at once.
+fn draw_terrain(
+    gpu: &GpuContext,
+    pass: &mut wgpu::RenderPass<'_>,
+    pipelines: &SurfacePipelines,
+    slot: &mut IdealSlot,
+    terrain: &Terrain,
+    mesh: &TerrainMesh,
+    base_ned_m: DVec3,
+) {
+    let Some(group) = slot.terrain_group.as_ref().filter(|_| !mesh.indices.is_empty()) else { return };
+    let place = |&chunk: &u32| {
+        let chunk = &terrain.chunks[chunk as usize];
+        ChunkPlace { centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(), first_vertex: chunk.first_vertex }
+    };
+    let places: Vec<ChunkPlace> = mesh.chunks.iter().map(place).collect();
+    gpu.queue.write_buffer(&slot.chunks, 0, bytemuck::cast_slice(&places));
+    let bytes: &[u8] = bytemuck::cast_slice(&mesh.indices);
+    if slot.indices.size() < bytes.len() as u64 {
+        slot.indices = index_buffer(gpu, bytes.len() as u64);
+    }
+    gpu.queue.write_buffer(&slot.indices, 0, bytes);
+    pass.set_pipeline(&pipelines.terrain);
+    pass.set_bind_group(1, group, &[]);
+    pass.set_index_buffer(slot.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.draw_indexed(0..mesh.indices.len() as u32, 0, 0..1);
+}
+
+/// For at least so many bytes: a power of two, so that few frames need another.
+fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.ideal.indices"),
+        size: bytes.next_power_of_two().max(MIN_INDEX_BYTES),
+        usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 /// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.
