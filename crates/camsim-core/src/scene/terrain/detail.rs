@@ -1,6 +1,9 @@
 //! How exact a camera needs each part of a terrain to be.
 
-use std::sync::OnceLock;
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicU16, Ordering::Relaxed},
+};
 
 use glam::DVec3;
 
@@ -15,11 +18,22 @@ use crate::pose::CameraPose;
 /// Tolerance of what is out of sight: above that of anything else.
 pub(super) const OUT_OF_SIGHT: u16 = u16::MAX - 1;
 
-/// Squares of 8x8 cells along a side of a chunk.
-pub(super) const BLOCKS: usize = (CHUNK_CELLS / NODE_CELLS[0]) as usize;
+/// Not asked for yet: no tolerance is this high.
+const UNKNOWN: u16 = u16::MAX;
 
-/// Squares of one size around a chunk: those of the chunk and one more on each side.
+/// Squares of one size along a side of a chunk and its surroundings: one more at each end.
 const AROUND: [usize; NODE_CELLS.len()] = [10, 6, 4, 3];
+
+/// Where the squares of each size begin among those around a chunk, and how many there are.
+const FIRST: [usize; NODE_CELLS.len() + 1] = {
+    let mut first = [0; NODE_CELLS.len() + 1];
+    let mut size = 0;
+    while size < NODE_CELLS.len() {
+        first[size + 1] = first[size] + AROUND[size] * AROUND[size];
+        size += 1;
+    }
+    first
+};
 
 /// How a camera sees deviations of a surface.
 ///
@@ -91,13 +105,25 @@ impl Judge {
     }
 }
 
-/// What a chunk's triangles are judged by.
+/// What a chunk's triangles are judged by, as far as it was asked for. Whoever finds a number first finds the same.
 #[derive(Debug)]
 pub(super) struct Tolerances {
-    /// Of each of the lattice's sets of squares.
-    pub of_set: Vec<u16>,
-    /// Which squares of 8x8 cells are in sight, row after row.
-    pub in_sight: [bool; BLOCKS * BLOCKS],
+    chunk: u32,
+    of_set: Vec<AtomicU16>,
+    of_square: [AtomicU16; FIRST[NODE_CELLS.len()]],
+}
+
+impl Tolerances {
+    pub fn new(chunk: u32) -> Self {
+        let unknown = || AtomicU16::new(UNKNOWN);
+        Self { chunk, of_set: LATTICE.sets.iter().map(|_| unknown()).collect(), of_square: std::array::from_fn(|_| unknown()) }
+    }
+
+    /// For another chunk.
+    pub fn reset(&mut self, chunk: u32) {
+        self.chunk = chunk;
+        self.of_set.iter_mut().chain(&mut self.of_square).for_each(|known| *known.get_mut() = UNKNOWN);
+    }
 }
 
 /// A terrain as one camera needs it: triangles are halved until their vertical errors are within the tolerance. A pure function of
@@ -110,7 +136,8 @@ pub struct TerrainDetail<'a> {
     chunks: Vec<u16>,
     /// Chunks in sight that have a surface, by number.
     pub(super) in_sight: Vec<u32>,
-    tolerances: Vec<OnceLock<Tolerances>>,
+    /// Of these chunks; a mesh does without.
+    tolerances: Vec<OnceLock<Box<Tolerances>>>,
 }
 
 impl<'a> TerrainDetail<'a> {
@@ -128,7 +155,7 @@ impl<'a> TerrainDetail<'a> {
             }
         });
         in_sight.sort_unstable();
-        let tolerances = terrain.chunks.iter().map(|_| OnceLock::new()).collect();
+        let tolerances = in_sight.iter().map(|_| OnceLock::new()).collect();
         Self { terrain, judge, chunks, in_sight, tolerances }
     }
 
@@ -151,49 +178,73 @@ impl<'a> TerrainDetail<'a> {
         &self.terrain.errors[chunk as usize * PER_CHUNK..][..PER_CHUNK]
     }
 
-    /// Error of a chunk as two triangles, and its tolerance.
-    pub(super) fn root(&self, chunk: u32) -> (u16, u16) {
+    /// Kept for a chunk; `None` out of sight.
+    pub(super) fn tolerances(&self, chunk: u32) -> Option<&Tolerances> {
+        let place = self.in_sight.binary_search(&chunk).ok()?;
+        Some(self.tolerances[place].get_or_init(|| Box::new(Tolerances::new(chunk))))
+    }
+
+    /// The strictest tolerance of one of the lattice's sets of squares.
+    #[inline]
+    pub(super) fn of_set(&self, known: &Tolerances, set: u16) -> u16 {
+        match known.of_set[usize::from(set)].load(Relaxed) {
+            UNKNOWN => self.find_set(known, set),
+            tolerance => tolerance,
+        }
+    }
+
+    /// A tolerance that none of a chunk is stricter than.
+    pub(super) fn of_root(&self, known: &Tolerances) -> u16 {
         let (root, _) = lattice::halves(lattice::ROOTS[0]);
-        let squares = &LATTICE.sets[usize::from(LATTICE.set_of_vertex[root as usize])];
-        (self.errors(chunk)[root as usize], strictest(squares, &self.chunks_around(chunk), AROUND[squares.size]))
+        self.of_set(known, LATTICE.set_of_vertex[root as usize])
     }
 
-    pub(super) fn tolerances(&self, chunk: u32) -> &Tolerances {
-        self.tolerances[chunk as usize].get_or_init(|| self.find_tolerances(chunk))
+    #[cold]
+    fn find_set(&self, known: &Tolerances, set: u16) -> u16 {
+        let strictest = self.strictest(known, &LATTICE.sets[usize::from(set)]);
+        known.of_set[usize::from(set)].store(strictest, Relaxed);
+        strictest
     }
 
-    fn chunks_around(&self, chunk: u32) -> [u16; AROUND[NODE_CELLS.len() - 1].pow(2)] {
-        let [columns, rows] = self.terrain.chunk_grid.map(i64::from);
-        let (x, y) = (i64::from(chunk) % columns, i64::from(chunk) / columns);
-        std::array::from_fn(|k| {
-            let (x, y) = (x + k as i64 % 3 - 1, y + k as i64 / 3 - 1);
-            let is_chunk = (0..columns).contains(&x) && (0..rows).contains(&y);
-            if is_chunk { self.chunks[(y * columns + x) as usize] } else { OUT_OF_SIGHT }
-        })
+    /// Whether the square of 8x8 cells that holds a vertex and the cell to its south-east is in sight.
+    pub(super) fn block_in_sight(&self, known: &Tolerances, vertex: u32) -> bool {
+        let [column, row] = lattice::place(vertex).map(|n| (n / NODE_CELLS[0]) as i32);
+        self.of_square(known, 0, column, row) != OUT_OF_SIGHT
     }
 
-    fn find_tolerances(&self, chunk: u32) -> Tolerances {
-        let columns = self.terrain.chunk_grid[0];
-        let at = [chunk % columns, chunk / columns];
-        let around: [Vec<u16>; NODE_CELLS.len()] = std::array::from_fn(|size| {
-            if size + 1 == NODE_CELLS.len() {
-                return self.chunks_around(chunk).to_vec();
+    fn strictest(&self, known: &Tolerances, squares: &Squares) -> u16 {
+        let mut strictest = OUT_OF_SIGHT;
+        for row in squares.rows() {
+            for column in squares.columns() {
+                strictest = strictest.min(self.of_square(known, squares.size, column, row));
             }
-            let (cells, count) = (NODE_CELLS[size], AROUND[size] as i64);
-            let first = at.map(|n| i64::from(n * (CHUNK_CELLS / cells)) - 1);
-            let tolerance = |k: i64| {
-                let bounds = self.terrain.tree.square(cells, [first[0] + k % count, first[1] + k / count]);
-                bounds.map_or(OUT_OF_SIGHT, |bounds| self.judge.tolerance(bounds, self.terrain.horizontal_m[size]))
-            };
-            (0..count * count).map(tolerance).collect()
-        });
-        let of_set = LATTICE.sets.iter().map(|squares| strictest(squares, &around[squares.size], AROUND[squares.size])).collect();
-        let block = |k: usize| around[0][(k / BLOCKS + 1) * AROUND[0] + k % BLOCKS + 1] != OUT_OF_SIGHT;
-        Tolerances { of_set, in_sight: std::array::from_fn(block) }
+        }
+        strictest
     }
-}
 
-fn strictest(squares: &Squares, around: &[u16], side: usize) -> u16 {
-    let rows = squares.rows().map(|row| &around[(row + 1) as usize * side..]);
-    rows.flat_map(|row| squares.columns().map(|column| row[(column + 1) as usize])).fold(OUT_OF_SIGHT, u16::min)
+    /// Tolerance of a square by its place, counted from the chunk's first.
+    fn of_square(&self, known: &Tolerances, size: usize, column: i32, row: i32) -> u16 {
+        let of_square = &known.of_square[FIRST[size] + (row + 1) as usize * AROUND[size] + (column + 1) as usize];
+        match of_square.load(Relaxed) {
+            UNKNOWN => {
+                let tolerance = self.find(known.chunk, size, column, row);
+                of_square.store(tolerance, Relaxed);
+                tolerance
+            }
+            tolerance => tolerance,
+        }
+    }
+
+    fn find(&self, chunk: u32, size: usize, column: i32, row: i32) -> u16 {
+        let grid = self.terrain.chunk_grid;
+        let (cells, per_chunk) = (NODE_CELLS[size], CHUNK_CELLS / NODE_CELLS[size]);
+        let at = [chunk % grid[0], chunk / grid[0]].map(|n| i64::from(n * per_chunk));
+        let at = [at[0] + i64::from(column), at[1] + i64::from(row)];
+        if size + 1 == NODE_CELLS.len() {
+            let is_chunk = (0..2).all(|k| (0..i64::from(grid[k])).contains(&at[k]));
+            return if is_chunk { self.chunks[(at[1] * i64::from(grid[0]) + at[0]) as usize] } else { OUT_OF_SIGHT };
+        }
+        let bounds = self.terrain.tree.square(cells, at);
+        bounds.map_or(OUT_OF_SIGHT, |bounds| self.judge.tolerance(bounds, self.terrain.horizontal_m[size]))
+    }
 }

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::{
     TerrainDetail, TerrainHit,
-    detail::{BLOCKS, Tolerances},
-    lattice::{self, BLOCK_DEPTH, DEPTHS, LATTICE, NODE_CELLS, ROOTS, SIDE, VERTICES},
+    detail::Tolerances,
+    lattice::{self, BLOCK_DEPTH, DEPTHS, LATTICE, Lattice, NODE_CELLS, ROOTS, SIDE, VERTICES},
 };
 
 /// Bits of an index that are a vertex's number in its chunk; those above are the place of the chunk in [`TerrainMesh::chunks`].
@@ -37,8 +37,18 @@ pub struct TerrainMesh {
 impl TerrainDetail<'_> {
     /// The triangles to draw, in the order of the chunks.
     pub fn mesh(&self) -> TerrainMesh {
-        let parts: Vec<(Vec<u32>, Option<i32>)> =
-            self.in_sight.par_iter().enumerate().map(|(place, &chunk)| self.chunk_mesh(place as u32, chunk)).collect();
+        let parts: Vec<(Vec<u32>, Option<i32>)> = self
+            .in_sight
+            .par_iter()
+            .enumerate()
+            .map_init(
+                || Tolerances::new(0),
+                |known, (place, &chunk)| {
+                    known.reset(chunk);
+                    self.chunk_mesh(known, place as u32, chunk)
+                },
+            )
+            .collect();
         let nearest = parts.iter().filter_map(|part| part.1).max();
         let mut indices = Vec::with_capacity(parts.iter().map(|part| part.0.len()).sum());
         parts.iter().for_each(|part| indices.extend_from_slice(&part.0));
@@ -57,17 +67,9 @@ impl TerrainDetail<'_> {
         (share * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
 
-    fn chunk_mesh(&self, place: u32, chunk: u32) -> (Vec<u32>, Option<i32>) {
-        let mut walk = Walk { errors: self.errors(chunk), emit: Emit::new(self, place, chunk), nearest: None };
-        let (error, tolerance) = self.root(chunk);
-        if error > tolerance {
-            let tolerances = self.tolerances(chunk);
-            ROOTS.into_iter().for_each(|root| walk.triangle(tolerances, root, 0));
-        } else {
-            // Nothing else need be known about a chunk this far away.
-            walk.note(error, tolerance);
-            ROOTS.into_iter().for_each(|root| walk.emit.triangle(root));
-        }
+    fn chunk_mesh(&self, known: &Tolerances, place: u32, chunk: u32) -> (Vec<u32>, Option<i32>) {
+        let mut walk = Walk { judged: Judged::new(self, known, chunk), emit: Emit::new(self, place, chunk), nearest: None };
+        ROOTS.into_iter().for_each(|root| walk.triangle(root, 0));
         (walk.emit.indices, walk.nearest)
     }
 
@@ -75,7 +77,8 @@ impl TerrainDetail<'_> {
     /// under the hit's cell which the ray passes deepest inside. Where the ray leaves that cell's triangles before it meets them, their planes are continued.
     pub fn drawn_t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
         let chunk = &self.terrain.chunks[hit.chunk as usize];
-        let (errors, tolerances) = (self.errors(hit.chunk), self.tolerances(hit.chunk));
+        let Some(known) = self.tolerances(hit.chunk) else { return hit.t };
+        let judged = Judged::new(self, known, hit.chunk);
         let mut best = (f64::NEG_INFINITY, hit.t);
         let mut stack: Vec<([u32; 3], u32)> = ROOTS.map(|root| (root, 0)).to_vec();
         while let Some((triangle, depth)) = stack.pop() {
@@ -92,11 +95,11 @@ impl TerrainDetail<'_> {
             }
             if depth < DEPTHS {
                 let (middle, halves) = lattice::halves(triangle);
-                if is_halved(errors, tolerances, middle) {
+                if judged.vertex(middle).is_needed() {
                     stack.extend(halves.map(|half| (half, depth + 1)));
                     continue;
                 }
-            } else if lattice::cell_to_turn(triangle).is_none_or(|cell| is_turned(errors, tolerances, cell)) {
+            } else if lattice::cell_to_turn(triangle).is_none_or(|cell| judged.cell(cell).is_needed()) {
                 // The full surface itself.
                 return hit.t;
             }
@@ -114,55 +117,88 @@ impl TerrainDetail<'_> {
     }
 }
 
-fn is_halved(errors: &[u16], tolerances: &Tolerances, middle: u32) -> bool {
-    errors[middle as usize] > tolerances.of_set[usize::from(LATTICE.set_of_vertex[middle as usize])]
+/// Errors of one chunk's vertices and cells, and what they may be.
+struct Judged<'a> {
+    detail: &'a TerrainDetail<'a>,
+    known: &'a Tolerances,
+    errors: &'a [u16],
+    /// None of the tolerances is below this: what keeps it need not be looked at any closer.
+    strictest: u16,
+    lattice: &'static Lattice,
 }
 
-fn is_turned(errors: &[u16], tolerances: &Tolerances, cell: u32) -> bool {
-    errors[VERTICES + cell as usize / 2] > tolerances.of_set[usize::from(LATTICE.set_of_cell[cell as usize / 2])]
+struct Judgement {
+    error: u16,
+    tolerance: u16,
+}
+
+impl Judgement {
+    fn is_needed(&self) -> bool {
+        self.error > self.tolerance
+    }
+}
+
+impl<'a> Judged<'a> {
+    fn new(detail: &'a TerrainDetail<'_>, known: &'a Tolerances, chunk: u32) -> Self {
+        Self { detail, known, errors: detail.errors(chunk), strictest: detail.of_root(known), lattice: &LATTICE }
+    }
+
+    #[inline]
+    fn vertex(&self, vertex: u32) -> Judgement {
+        self.judge(self.errors[vertex as usize], self.lattice.set_of_vertex[vertex as usize])
+    }
+
+    #[inline]
+    fn cell(&self, cell: u32) -> Judgement {
+        self.judge(self.errors[VERTICES + cell as usize / 2], self.lattice.set_of_cell[cell as usize / 2])
+    }
+
+    #[inline]
+    fn judge(&self, error: u16, set: u16) -> Judgement {
+        let tolerance = if error <= self.strictest { self.strictest } else { self.detail.of_set(self.known, set) };
+        Judgement { error, tolerance }
+    }
 }
 
 /// Down the hierarchy of one chunk.
 struct Walk<'a> {
-    errors: &'a [u16],
+    judged: Judged<'a>,
     emit: Emit<'a>,
     /// Steps that the error nearest to its tolerance is below it; `None` while all is exact.
     nearest: Option<i32>,
 }
 
 impl Walk<'_> {
-    fn triangle(&mut self, tolerances: &Tolerances, triangle: [u32; 3], depth: u32) {
-        if depth == BLOCK_DEPTH && !tolerances.in_sight[block_of(triangle)] {
+    fn triangle(&mut self, triangle: [u32; 3], depth: u32) {
+        if depth == BLOCK_DEPTH && !self.judged.detail.block_in_sight(self.judged.known, north_west(triangle)) {
             return;
         }
         if depth == DEPTHS {
-            return self.half_cell(tolerances, triangle);
+            return self.half_cell(triangle);
         }
         let (middle, [first, second]) = lattice::halves(triangle);
-        let error = self.errors[middle as usize];
-        let tolerance = tolerances.of_set[usize::from(LATTICE.set_of_vertex[middle as usize])];
-        if error > tolerance {
-            self.triangle(tolerances, first, depth + 1);
-            self.triangle(tolerances, second, depth + 1);
+        let judgement = self.judged.vertex(middle);
+        if judgement.is_needed() {
+            self.triangle(first, depth + 1);
+            self.triangle(second, depth + 1);
         } else {
-            self.note(error, tolerance);
+            self.note(judgement);
             self.emit.triangle(triangle);
         }
     }
 
-    fn half_cell(&mut self, tolerances: &Tolerances, triangle: [u32; 3]) {
+    fn half_cell(&mut self, triangle: [u32; 3]) {
         let Some(cell) = lattice::cell_to_turn(triangle) else { return self.emit.triangle(triangle) };
-        let error = self.errors[VERTICES + cell as usize / 2];
-        let tolerance = tolerances.of_set[usize::from(LATTICE.set_of_cell[cell as usize / 2])];
-        if error > tolerance {
+        let judgement = self.judged.cell(cell);
+        if judgement.is_needed() {
             self.emit.triangle(lattice::turned(triangle, cell));
         } else {
-            self.note(error, tolerance);
+            self.note(judgement);
             self.emit.triangle(triangle);
         }
     }
 
-    fn note(&mut self, error: u16, tolerance: u16) {
+    fn note(&mut self, Judgement { error, tolerance }: Judgement) {
         // 1 is exact.
         if error > 1 {
             self.nearest = self.nearest.max(Some(i32::from(error) - i32::from(tolerance)));
@@ -170,13 +206,11 @@ impl Walk<'_> {
     }
 }
 
-/// Number of the square of 8x8 cells of which a triangle is half.
-fn block_of([a, b, _]: [u32; 3]) -> usize {
+/// The corner of the square of 8x8 cells of which a triangle is half.
+fn north_west([a, b, _]: [u32; 3]) -> u32 {
     let size = NODE_CELLS[0];
     // The longest side runs from north-west to south-east or from north-east to south-west.
-    let north_west = if a.abs_diff(b) == size * (SIDE + 1) { a.min(b) } else { a.min(b) - size };
-    let [i, j] = lattice::place(north_west);
-    (j / size) as usize * BLOCKS + (i / size) as usize
+    if a.abs_diff(b) == size * (SIDE + 1) { a.min(b) } else { a.min(b) - size }
 }
 
 /// Writes triangles of one chunk.
