@@ -215,7 +215,7 @@ pub(super) fn saturate(keys: &mut [u16], chunk_grid: [u32; 2]) {
                 });
             }
         });
-        if depth % 2 == 1 {
+        if !depth.is_multiple_of(2) {
             share_borders(keys, chunk_grid, depth);
         }
     }
@@ -226,7 +226,7 @@ fn needing(depth: u32) -> [[i32; 2]; 4] {
     let step = 32 >> (depth / 2);
     match depth {
         11 => [[0, 0], [-1, -1], [0, 0], [-1, -1]],
-        _ if depth % 2 == 0 => [[step, 0], [0, step], [-step, 0], [0, -step]],
+        _ if depth.is_multiple_of(2) => [[step, 0], [0, step], [-step, 0], [0, -step]],
         _ => [[step / 2, step / 2], [-step / 2, step / 2], [-step / 2, -step / 2], [step / 2, -step / 2]],
     }
 }

@@ -171,7 +171,7 @@ mod tests {
         for root in ROOTS {
             assert_eq!(area2(root), -64 * 64);
             all(root, 0, &mut |triangle, depth| {
-                assert_eq!(area2(triangle), -64 * 64 >> depth, "{triangle:?}");
+                assert_eq!(area2(triangle), (-64 * 64) >> depth, "{triangle:?}");
                 if depth < DEPTHS {
                     assert_eq!(depth_of(halves(triangle).0), Some(depth));
                     let [at, ends @ ..] = [halves(triangle).0, triangle[0], triangle[1]].map(place);
