@@ -3,13 +3,19 @@
 //!
 //! `cargo bench --bench host`
 
-use std::{convert::Infallible, hint::black_box, time::Duration};
+use std::{
+    convert::Infallible,
+    hint::black_box,
+    time::{Duration, Instant},
+};
 
 use camsim::{
     core::{
         frame::RenderedFrame,
         plan::{Planner, line_poses},
+        pose::CameraPose,
         scenario::{Channel, ExrCompression, ImageFormat, OutputSpec, TrackerKind, TrackerSpec},
+        scene::{Terrain, TerrainDetail},
         tracker::track,
     },
     gpu::{AdapterChoice, Engine},
@@ -35,6 +41,7 @@ fn main() -> Outcome<()> {
         .configure_from_args();
     let loaded = flight::load()?;
     planning(&mut criterion, &loaded)?;
+    terrain(&mut criterion, &loaded)?;
     tracking(&mut criterion, &loaded);
     files(&mut criterion, &loaded)?;
     criterion.final_summary();
@@ -53,6 +60,51 @@ fn planning(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     }
     group.finish();
     Ok(())
+}
+
+/// What is drawn of a terrain: of the demo's in frame 60, and of ones of different sizes under the same camera.
+fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
+    let mut group = criterion.benchmark_group("terrain");
+    let sequence = &loaded.sequence;
+    let plan = Planner::new(sequence.clone(), &sequence.scenario.output.channels, MAX_SIDE_PX)?.plan(60)?;
+    let focal_px = plan.ideal.focal_px.max_element();
+    let mut measure = |name: &str, terrain: &Terrain, pose: &CameraPose| {
+        let detail = || TerrainDetail::new(black_box(terrain), pose, plan.tangents(), focal_px, plan.terrain_error_px);
+        let lod = detail().mesh().lod;
+        println!("{name}: {} triangles of {} chunks, within {:.3} px", lod.triangles, lod.chunks, lod.max_error_px);
+        group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| bencher.iter(|| detail().mesh()));
+    };
+    if let Some(terrain) = &sequence.scene.terrain {
+        measure("demo", terrain, &plan.key_pose);
+    }
+    for side in std::env::var("CAMSIM_TERRAIN_SIDES").unwrap_or("1025 4097".into()).split_whitespace() {
+        let begun = Instant::now();
+        let (name, terrain) = (format!("{side} x {side} heights"), rugged(side.parse()?)?);
+        println!("{name}: made in {:.1} s", begun.elapsed().as_secs_f64());
+        // Over its middle, as the demo's camera looks.
+        let mut pose = plan.key_pose;
+        pose.position_ned_m *= 0.0;
+        pose.position_ned_m.z = terrain.down_at(0.0, 0.0).unwrap_or_default() - 1000.0;
+        measure(&name, &terrain, &pose);
+    }
+    group.finish();
+    Ok(())
+}
+
+/// Hills of all sizes, the same at each place whatever the number of heights, 10 m apart.
+fn rugged(side: u32) -> Outcome<Terrain> {
+    let at = |index: u32| f64::from(index) - f64::from(side / 2);
+    let height = |i: f64, j: f64| -> f64 {
+        (0..12)
+            .map(|octave| {
+                let (size, turn) = (0.7 * 0.5_f64.powi(octave), f64::from(octave));
+                let (x, y) = (i * turn.cos() - j * turn.sin(), i * turn.sin() + j * turn.cos());
+                0.7 / size * (size * x).sin() * (size * y + turn).cos()
+            })
+            .sum()
+    };
+    let heights: Vec<f64> = (0..side * side).map(|k| height(at(k % side), at(k / side))).collect();
+    Ok(Terrain::from_heights(side, side, 10.0, &heights, None)?)
 }
 
 /// The whole log, once a run.

@@ -10,8 +10,8 @@ pub mod texture;
 
 pub use mesh::{Mesh, MeshVertex, Wrap};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, ChunkDraw, LEVELS, LevelError, LodSelection, Terrain, TerrainChunk, TerrainError, TerrainHit, TerrainVertex,
-    lod_vertex, select_lod, snap,
+    Aabb, CHUNK_CELLS, LodSelection, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainHit, TerrainMesh, TerrainVertex,
+    VERTEX_BITS,
 };
 pub use texture::{Encoding, MipLevel, Texture, linear_from_srgb, srgb_from_linear};
 

@@ -4,14 +4,14 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, select_lod},
+    scene::{LodSelection, Scene, Terrain, TerrainDetail, TerrainMesh},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
 
 use crate::{
     context::GpuContext,
-    layout::{ChunkDraw, IdealCamera},
+    layout::{ChunkPlace, IdealCamera},
     recorder::Recorder,
     shaders::{self, ComposeError},
     upload::SceneBuffers,
@@ -32,6 +32,9 @@ pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Distance between the placements of two meshes in their buffer.
 const PLACEMENT_STRIDE: u64 = 256;
+
+/// Room for the indices of a few thousand triangles, bytes.
+const MIN_INDEX_BYTES: u64 = 1 << 16;
 
 /// Textures that an ideal frame is drawn to.
 #[derive(Debug)]
@@ -123,7 +126,9 @@ struct SurfacePipelines {
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
-    draws: wgpu::Buffer,
+    chunks: wgpu::Buffer,
+    /// Of the terrain's triangles; replaced by a larger one when a frame has more than any before.
+    indices: wgpu::Buffer,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     terrain_group: Option<wgpu::BindGroup>,
@@ -179,7 +184,8 @@ impl IdealPass {
         };
         let chunks = scene.terrain.as_ref().map_or(0, |terrain| terrain.chunks.len());
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let draws = create("camsim.ideal.draws", (chunks * size_of::<ChunkDraw>()) as u64, wgpu::BufferUsages::STORAGE);
+        let chunks = create("camsim.ideal.chunks", (chunks * size_of::<ChunkPlace>()) as u64, wgpu::BufferUsages::STORAGE);
+        let indices = index_buffer(gpu, 0);
         let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
@@ -194,7 +200,7 @@ impl IdealPass {
                     entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
                     entry(1, sampler.clone()),
                     entry(2, terrain.vertices.as_entire_binding()),
-                    entry(3, draws.as_entire_binding()),
+                    entry(3, chunks.as_entire_binding()),
                 ],
             )
         });
@@ -210,7 +216,7 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, draws, placements, camera_group, terrain_group, mesh_groups }
+        IdealSlot { camera, chunks, indices, placements, camera_group, terrain_group, mesh_groups }
     }
 
     /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
@@ -218,7 +224,7 @@ impl IdealPass {
         &self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        slots: &[IdealSlot],
+        slots: &mut [IdealSlot],
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
@@ -229,29 +235,33 @@ impl IdealPass {
         let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
         let (color_view, depth_view) = (view(color), view(depth));
         let mut middle_lod = LodSelection::default();
-        let mut draws = Vec::new();
-        for (k, (key, slot)) in plan.keys.iter().zip(slots).enumerate() {
+        let mut index_counts = Vec::new();
+        for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
             gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let focal_px = plan.ideal.focal_px.max_element();
-            let lod = scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
-                select_lod(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px)
-            });
+            let mut lod = LodSelection::default();
+            let mut indices = 0;
+            if let Some(terrain) = &scene.terrain {
+                let mesh = TerrainDetail::new(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px).mesh();
+                indices = place_terrain(gpu, slot, terrain, &mesh, base_ned_m);
+                lod = mesh.lod;
+            }
+            index_counts.push(indices);
             place_meshes(gpu, slot, buffers, base_ned_m);
-            draws.push((slot, place_terrain(gpu, slot, scene, buffers, &lod, base_ned_m)));
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
         }
         let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), depth_attachment(&depth_view));
-        self.draw_keys(&mut pass, &self.plain, plan, 1, buffers, &draws);
+        self.draw_keys(&mut pass, &self.plain, plan, 1, buffers, slots, &index_counts);
         drop(pass);
         if let Some(fine) = &target.fine {
             let depth_view = fine.depth_view();
             let color_view = fine.color.as_ref().map(view);
             let color = color_view.as_ref().map(|view| color_attachment(view, scene));
             let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&depth_view));
-            self.draw_keys(&mut pass, &self.fine[usize::from(fine.color.is_some())], plan, fine.scale, buffers, &draws);
+            self.draw_keys(&mut pass, &self.fine[usize::from(fine.color.is_some())], plan, fine.scale, buffers, slots, &index_counts);
             drop(pass);
             self.resolve.encode(gpu, recorder, plan, target, fine);
         }
@@ -266,87 +276,18 @@ impl IdealPass {
         plan: &FramePlan,
         scale: u32,
         buffers: &SceneBuffers,
-        keys: &[(&IdealSlot, Vec<TerrainDraw>)],
+        slots: &[IdealSlot],
+        index_counts: &[u32],
     ) {
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
-        for ((slot, terrain), k) in keys.iter().zip(0..) {
+        for ((slot, &indices), k) in slots.iter().zip(index_counts).zip(0..) {
             let first_row = key_rows(&plan.ideal) * k * scale;
             pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(0, first_row, width, height);
             pass.set_bind_group(0, &slot.camera_group, &[]);
-            draw_terrain(pass, pipelines, slot, buffers, terrain);
+            draw_terrain(pass, pipelines, slot, indices);
             draw_meshes(pass, pipelines, slot, buffers);
         }
-    }
-}
-
-/// Triangles of terrain chunks that are drawn together.
-#[derive(Debug)]
-struct TerrainDraw {
-    indices: std::ops::Range<u32>,
-    instances: std::ops::Range<u32>,
-}
-
-/// Writes where the chunks of a key stand and how fine they are.
-fn place_terrain(
-    gpu: &GpuContext,
-    slot: &IdealSlot,
-    scene: &Scene,
-    buffers: &SceneBuffers,
-    lod: &LodSelection,
-    base_ned_m: DVec3,
-) -> Vec<TerrainDraw> {
-    let (Some(terrain), Some(on_device)) = (&scene.terrain, &buffers.terrain) else { return Vec::new() };
-    // Chunks of one level are drawn together; those with voids come last, one by one.
-    let mut order: Vec<_> = lod.draws.iter().collect();
-    order.sort_by_key(|draw| (terrain.chunks[draw.chunk as usize].void_indices.is_some(), draw.level, draw.chunk));
-    let rows: Vec<ChunkDraw> = order
-        .iter()
-        .map(|draw| {
-            let chunk = &terrain.chunks[draw.chunk as usize];
-            let [north, east, south, west] = draw.edge_levels.map(u32::from);
-            ChunkDraw {
-                centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(),
-                first_vertex: chunk.first_vertex,
-                cells: chunk.cells,
-                levels: u32::from(draw.level) | north << 4 | east << 8 | south << 12 | west << 16,
-                pad: 0,
-            }
-        })
-        .collect();
-    gpu.queue.write_buffer(&slot.draws, 0, bytemuck::cast_slice(&rows));
-    let mut draws = Vec::new();
-    let mut first = 0;
-    while let Some(draw) = order.get(first) {
-        let chunk = &terrain.chunks[draw.chunk as usize];
-        let (indices, last) = match &chunk.void_indices {
-            Some(range) => (on_device.void_base + range.start..on_device.void_base + range.end, first + 1),
-            None => {
-                let same =
-                    |d: &&camsim_core::scene::ChunkDraw| d.level == draw.level && terrain.chunks[d.chunk as usize].void_indices.is_none();
-                let count = order[first..].iter().take_while(|d| same(d)).count();
-                (on_device.levels[draw.level as usize].clone(), first + count)
-            }
-        };
-        draws.push(TerrainDraw { indices, instances: first as u32..last as u32 });
-        first = last;
-    }
-    draws
-}
-
-fn draw_terrain(
-    pass: &mut wgpu::RenderPass<'_>,
-    pipelines: &SurfacePipelines,
-    slot: &IdealSlot,
-    buffers: &SceneBuffers,
-    draws: &[TerrainDraw],
-) {
-    let (Some(on_device), Some(group)) = (&buffers.terrain, &slot.terrain_group) else { return };
-    pass.set_pipeline(&pipelines.terrain);
-    pass.set_bind_group(1, group, &[]);
-    pass.set_index_buffer(on_device.indices.slice(..), wgpu::IndexFormat::Uint32);
-    for draw in draws {
-        pass.draw_indexed(draw.indices.clone(), 0, draw.instances.clone());
     }
 }
 
@@ -389,6 +330,41 @@ fn depth_attachment(view: &wgpu::TextureView) -> wgpu::RenderPassDepthStencilAtt
         depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
         stencil_ops: None,
     }
+}
+
+/// Writes where the chunks of a key stand and which triangles are drawn; returns the number of their indices.
+fn place_terrain(gpu: &GpuContext, slot: &mut IdealSlot, terrain: &Terrain, mesh: &TerrainMesh, base_ned_m: DVec3) -> u32 {
+    let place = |&chunk: &u32| {
+        let chunk = &terrain.chunks[chunk as usize];
+        ChunkPlace { centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(), first_vertex: chunk.first_vertex }
+    };
+    let places: Vec<ChunkPlace> = mesh.chunks.iter().map(place).collect();
+    gpu.queue.write_buffer(&slot.chunks, 0, bytemuck::cast_slice(&places));
+    let bytes: &[u8] = bytemuck::cast_slice(&mesh.indices);
+    if slot.indices.size() < bytes.len() as u64 {
+        slot.indices = index_buffer(gpu, bytes.len() as u64);
+    }
+    gpu.queue.write_buffer(&slot.indices, 0, bytes);
+    mesh.indices.len() as u32
+}
+
+/// Draws a terrain's triangles, all at once.
+fn draw_terrain(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, indices: u32) {
+    let Some(group) = slot.terrain_group.as_ref().filter(|_| indices > 0) else { return };
+    pass.set_pipeline(&pipelines.terrain);
+    pass.set_bind_group(1, group, &[]);
+    pass.set_index_buffer(slot.indices.slice(..), wgpu::IndexFormat::Uint32);
+    pass.draw_indexed(0..indices, 0, 0..1);
+}
+
+/// For at least so many bytes: a power of two, so that few frames need another.
+fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.ideal.indices"),
+        size: bytes.next_power_of_two().max(MIN_INDEX_BYTES),
+        usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
 }
 
 /// Uniforms of the key camera. Pixel centres stand at integers, so the viewport's half-pixel offset goes into the shift.

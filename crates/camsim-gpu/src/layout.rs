@@ -67,16 +67,13 @@ pub struct IdealCamera {
     pub pad2: f32,
 }
 
-/// Mirror of `ChunkDraw` in shaders/ideal/terrain.wgsl.
+/// Mirror of `ChunkPlace` in shaders/ideal/terrain.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]
-pub struct ChunkDraw {
+pub struct ChunkPlace {
     pub centre_from_base_m: [f32; 3],
     pub first_vertex: u32,
-    pub cells: [u32; 2],
-    pub levels: u32,
-    pub pad: u32,
 }
 
 /// Mirror of `Truth` in shaders/reverse/emit/truth.wgsl.
@@ -186,6 +183,6 @@ mod tests {
                 pad2,
             ]
         );
-        assert_mirror!(&module, "ChunkDraw", ChunkDraw, [centre_from_base_m, first_vertex, cells, levels, pad]);
+        assert_mirror!(&module, "ChunkPlace", ChunkPlace, [centre_from_base_m, first_vertex]);
     }
 }

@@ -1,6 +1,6 @@
 //! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
 
-use camsim_core::scene::{CHUNK_CELLS, Encoding, LEVELS, Mesh, Scene, Terrain, Texture, Wrap};
+use camsim_core::scene::{Encoding, Mesh, Scene, Terrain, Texture, Wrap};
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
@@ -17,17 +17,11 @@ pub struct SceneBuffers {
     pub sampler: wgpu::Sampler,
 }
 
-/// Terrain vertices and the index lists of every level.
+/// A terrain on the device; which triangles of it are drawn is found frame by frame.
 #[derive(Debug)]
 pub struct TerrainBuffers {
     /// Five floats a vertex.
     pub vertices: wgpu::Buffer,
-    /// Lattice indices: those of each level, then those of the chunks with voids.
-    pub indices: wgpu::Buffer,
-    /// Index range of each level.
-    pub levels: [std::ops::Range<u32>; LEVELS],
-    /// Offset of the void chunks' own indices.
-    pub void_base: u32,
     /// Picture on the ground.
     pub texture: wgpu::TextureView,
 }
@@ -82,44 +76,12 @@ fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers,
     let texture = upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?;
     let floats: Vec<f32> = terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], v.uv[0], v.uv[1]]).collect();
     gpu.check_storage("the terrain's vertices", 4 * floats.len() as u64, "use a smaller or coarser DEM in scene.terrain.dem")?;
-    let mut indices = Vec::new();
-    let levels = std::array::from_fn(|level| {
-        let first = indices.len() as u32;
-        push_level(&mut indices, 1 << level);
-        first..indices.len() as u32
+    let vertices = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("camsim.terrain.vertices"),
+        contents: bytemuck::cast_slice(&floats),
+        usage: wgpu::BufferUsages::STORAGE,
     });
-    let void_base = indices.len() as u32;
-    // Chunk-local vertex numbers to lattice numbers, so that one vertex shader serves both.
-    let mut lattice = vec![0; terrain.void_indices.len()];
-    for chunk in &terrain.chunks {
-        for i in chunk.void_indices.clone().unwrap_or_default() {
-            let (vertex, width) = (terrain.void_indices[i as usize], chunk.cells[0] + 1);
-            lattice[i as usize] = vertex / width * (CHUNK_CELLS + 1) + vertex % width;
-        }
-    }
-    indices.extend(lattice);
-    let buffer = |label, contents: &[u8], usage| {
-        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
-    };
-    Ok(TerrainBuffers {
-        vertices: buffer("camsim.terrain.vertices", bytemuck::cast_slice(&floats), wgpu::BufferUsages::STORAGE),
-        indices: buffer("camsim.terrain.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
-        levels,
-        void_base,
-        texture,
-    })
-}
-
-/// Two triangles a cell of stride `s` over the full 65x65 lattice, diagonal from north-west to south-east.
-fn push_level(indices: &mut Vec<u32>, s: u32) {
-    let row = CHUNK_CELLS + 1;
-    for j in (0..CHUNK_CELLS).step_by(s as usize) {
-        for i in (0..CHUNK_CELLS).step_by(s as usize) {
-            let nw = j * row + i;
-            let (ne, sw, se) = (nw + s, nw + s * row, nw + s * row + s);
-            indices.extend([nw, sw, se, nw, se, ne]);
-        }
-    }
+    Ok(TerrainBuffers { vertices, texture })
 }
 
 fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {

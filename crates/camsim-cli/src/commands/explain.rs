@@ -3,7 +3,7 @@
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, Solver},
-    scene::select_lod,
+    scene::TerrainDetail,
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
@@ -127,7 +127,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let tolerance_px = plan.terrain_error_px;
-    let lod = select_lod(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
+    let lod = TerrainDetail::new(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px).mesh().lod;
     Some(LevelOfDetail { triangles: lod.triangles, max_error_px: lod.max_error_px, tolerance_px })
 }
 

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
-    scene::{LodSelection, TerrainHit},
+    scene::{TerrainDetail, TerrainHit},
     shutter::Shutter,
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
@@ -80,7 +80,7 @@ pub(super) struct Outcome {
 struct KeyDepth<'a> {
     trial: &'a Trial<'a>,
     /// The terrain as it will be drawn.
-    lod: &'a LodSelection,
+    detail: Option<&'a TerrainDetail<'a>>,
     known: Vec<([i64; 2], f64)>,
 }
 
@@ -110,13 +110,13 @@ impl Trial<'_> {
     }
 
     /// What each way of solving makes of a probe.
-    pub fn run(&self, probe: &Probe, truth: &Truth, lod: &LodSelection) -> Outcome {
+    pub fn run(&self, probe: &Probe, truth: &Truth, detail: Option<&TerrainDetail<'_>>) -> Outcome {
         let off = |at_px: DVec2| if at_px.is_finite() { at_px.distance(truth.at_px) } else { f64::INFINITY };
         // Where the pixel itself would look: one pose for all lines. The paper's models read the depth there.
         let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
         let mut outcome =
             Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
-        let mut depth = KeyDepth { trial: self, lod, known: Vec::with_capacity(16) };
+        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16) };
         let places = settle(probe.uv, truth.in_key, self.ideal, &mut depth);
         outcome.after = places.map(off);
         let settled_px = places[MAX_LOOK_UPS];
@@ -172,9 +172,9 @@ impl Trial<'_> {
     }
 
     /// What the level of detail changes at the true source: depth there, and so parallax.
-    pub fn level_of_detail_px(&self, truth: &Truth, lod: &LodSelection) -> f64 {
-        let Some(Met { depth_m, terrain: Some(hit), .. }) = truth.seen.filter(|_| lod.max_error_px > 0.0) else { return 0.0 };
-        let drawn_m = self.drawn_depth_m(lod, &hit, self.key_ray(truth.at_px));
+    pub fn level_of_detail_px(&self, truth: &Truth, detail: Option<&TerrainDetail<'_>>) -> f64 {
+        let Some(Met { depth_m, terrain: Some(hit), .. }) = truth.seen else { return 0.0 };
+        let drawn_m = self.drawn_depth_m(detail, &hit, self.key_ray(truth.at_px));
         // w of the line's camera, as `reproject` finds it from the key's.
         let (direction, shift) = (truth.direction, truth.in_key.1);
         let inverse = |depth_m: f64| direction.z / (depth_m - shift.z).max(1e-9);
@@ -183,12 +183,8 @@ impl Trial<'_> {
     }
 
     /// Depth of the terrain as drawn, along a ray of the key camera that meets the full one at `hit`.
-    fn drawn_depth_m(&self, lod: &LodSelection, hit: &TerrainHit, ray_ned: DVec3) -> f64 {
-        let draw = lod.draws.binary_search_by_key(&hit.chunk, |draw| draw.chunk).ok().map(|i| &lod.draws[i]);
-        match (self.surfaces.terrain(), draw) {
-            (Some(terrain), Some(draw)) => terrain.drawn_t(hit, draw, self.key_pose.position_ned_m, ray_ned),
-            _ => hit.t,
-        }
+    fn drawn_depth_m(&self, detail: Option<&TerrainDetail<'_>>, hit: &TerrainHit, ray_ned: DVec3) -> f64 {
+        detail.map_or(hit.t, |detail| detail.drawn_t(hit, self.key_pose.position_ned_m, ray_ned))
     }
 
     /// Whether a probe is to be counted apart: its point is hidden from the key camera, or its own camera sees a step of depth beside it; with
@@ -265,7 +261,7 @@ impl KeyDepth<'_> {
         let ray = trial.key_ray(at_px);
         match trial.surfaces.meet(trial.key_pose.position_ned_m, ray) {
             None => 0.0,
-            Some(Met { terrain: Some(hit), .. }) => 1.0 / trial.drawn_depth_m(self.lod, &hit, ray),
+            Some(Met { terrain: Some(hit), .. }) => 1.0 / trial.drawn_depth_m(self.detail, &hit, ray),
             Some(met) => 1.0 / met.depth_m,
         }
     }

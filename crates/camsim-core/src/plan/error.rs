@@ -21,7 +21,7 @@ use crate::{
     camera::CameraModel,
     pose::CameraPose,
     scenario::{Auto, Preset},
-    scene::{LodSelection, select_lod},
+    scene::TerrainDetail,
     sequence::Sequence,
     shutter::Shutter,
     temporal::{
@@ -125,14 +125,14 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
     let mut terrain_error_px = quality.max_terrain_error_px;
-    let mut lod = case.level_of_detail(terrain_error_px);
-    let detail_px = truths.level_of_detail_px(&lod);
+    let mut detail = case.terrain_detail(terrain_error_px);
+    let detail_px = truths.level_of_detail_px(detail.as_ref());
     if SAFETY * detail_px > DETAIL_SHARE * tolerance_px {
-        // The error falls in proportion, in steps by which a chunk's level of detail changes.
+        // The error falls in proportion.
         terrain_error_px *= 0.8 * DETAIL_SHARE * tolerance_px / (SAFETY * detail_px);
-        lod = case.level_of_detail(terrain_error_px);
+        detail = case.terrain_detail(terrain_error_px);
     }
-    let forecast = truths.forecast(&lod);
+    let forecast = truths.forecast(detail.as_ref());
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match demanded {
@@ -172,10 +172,9 @@ impl Case<'_> {
     }
 
     /// The choice that the ideal pass will make.
-    fn level_of_detail(&self, max_error_px: f64) -> LodSelection {
-        self.sequence.scene.terrain.as_ref().map_or_else(LodSelection::default, |terrain| {
-            select_lod(terrain, self.key_pose, self.ideal.tangents(), self.ideal.focal_px.max_element(), max_error_px)
-        })
+    fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'_>> {
+        let terrain = self.sequence.scene.terrain.as_ref()?;
+        Some(TerrainDetail::new(terrain, self.key_pose, self.ideal.tangents(), self.ideal.focal_px.max_element(), max_error_px))
     }
 
     /// With an exposure that shows, the probes take turns in trying its middle and both its ends.
@@ -222,8 +221,8 @@ impl Looked {
 
 impl<'a> Truths<'a> {
     /// Largest displacement of a source by the level of detail.
-    fn level_of_detail_px(&self, lod: &LodSelection) -> f64 {
-        self.largest(|_, looked| self.trial.level_of_detail_px(&looked.truth, lod))
+    fn level_of_detail_px(&self, detail: Option<&TerrainDetail<'_>>) -> f64 {
+        self.largest(|_, looked| self.trial.level_of_detail_px(&looked.truth, detail))
     }
 
     /// The largest of a figure over the probes that are not to be counted apart. Only the largest are asked whether they are.
@@ -245,17 +244,17 @@ impl<'a> Truths<'a> {
         apart as f64 / asked.len().max(1) as f64
     }
 
-    fn forecast(self, lod: &'a LodSelection) -> Forecast<'a> {
-        let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, lod);
+    fn forecast(self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
+        let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
-        Forecast { outcomes, lod, truths: self }
+        Forecast { outcomes, detail, truths: self }
     }
 }
 
 /// Dry runs of one frame.
 struct Forecast<'a> {
     truths: Truths<'a>,
-    lod: &'a LodSelection,
+    detail: Option<&'a TerrainDetail<'a>>,
     /// One for each of the probes.
     outcomes: Vec<Outcome>,
 }
@@ -327,7 +326,7 @@ impl Forecast<'_> {
             lens_px,
             temporal_px,
             depth_px,
-            level_of_detail_px: self.truths.level_of_detail_px(self.lod),
+            level_of_detail_px: self.truths.level_of_detail_px(self.detail),
             nodes_px,
             format_px,
             resampling_dn,

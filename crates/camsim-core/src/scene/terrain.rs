@@ -1,44 +1,46 @@
 //! Ground from a grid of heights: two triangles a cell, diagonal from north-west to south-east.
 //!
-//! The full grid is *the* surface. For drawing it is cut into chunks of 64x64 cells that can be drawn with every 2^L-th vertex only
-//! (level of detail L), with borders that fit without gaps.
+//! The full grid is *the* surface. For drawing, its chunks of 64x64 cells are hierarchies of right triangles, each halved as often as a
+//! camera needs it ([`TerrainDetail`]).
 //!
 //! # Why there are no gaps
 //!
 //! * Vertex positions are rounded to multiples of one power of two, [`Terrain::quantum_m`], and chunk centres are whole metres. Offsets
 //!   are exact in f32, and so is `centre_ned_m - camera` for a camera position rounded to whole metres. Their f32 sum rounds the
 //!   same exact number for each chunk that shares a vertex, so the sums are equal bit by bit, at any distance.
-//! * Where levels differ, the finer chunk drops the border vertices that the coarser one does not have ([`snap`]).
+//! * Two triangles that share their longest side are halved together or not at all: whether they are follows from the vertex between them alone, its
+//!   error and its surroundings' tolerance. Errors are kept as those of all that needs the vertex, and it is judged by at least the
+//!   places that these are judged by: so a vertex that is used finds all those it needs used.
 
 mod bounds;
 mod build;
+mod detail;
+#[cfg(test)]
+mod drawn_tests;
 mod errors;
+mod lattice;
 mod query;
 mod select;
-mod stitch;
 #[cfg(test)]
 mod tests;
 
-use std::{fmt, ops::Range, sync::Arc};
+use std::{fmt, sync::Arc};
 
 use glam::{DVec3, Vec3};
 
 pub use bounds::Aabb;
 use bounds::BlockTree;
 pub(in crate::scene) use bounds::inverse;
+pub use detail::TerrainDetail;
 pub(crate) use query::Frustum;
 pub use query::TerrainHit;
 pub(crate) use query::intersect_triangle;
-pub use select::{ChunkDraw, LodSelection, select_lod};
-pub use stitch::{lod_vertex, snap};
+pub use select::{LodSelection, TerrainMesh, VERTEX_BITS};
 
 use super::Texture;
 
 /// Cells along each side of a full chunk.
 pub const CHUNK_CELLS: u32 = 64;
-
-/// Levels of detail: 0 (every vertex) to 6 (one cell a chunk).
-pub const LEVELS: usize = 7;
 
 /// A corner of the grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -50,20 +52,7 @@ pub struct TerrainVertex {
     pub uv: [f32; 2],
 }
 
-/// Largest deviation of a chunk's surface at one level from the full surface, in metres.
-///
-/// Corresponding points are those of equal grid coordinates (and so of equal texture coordinates up to interpolation). The distance
-/// between two piecewise linear surfaces is largest at a corner of the overlay of their triangles; all of them were looked at, so
-/// this is exact.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LevelError {
-    /// Distance in space.
-    pub total_m: f32,
-    /// The part of it in the north-east plane.
-    pub horizontal_m: f32,
-}
-
-/// Up to 64x64 cells that are drawn at one level of detail.
+/// Up to 64x64 cells.
 #[derive(Clone, Debug)]
 pub struct TerrainChunk {
     /// Origin of the vertices' offsets: whole metres.
@@ -74,24 +63,10 @@ pub struct TerrainChunk {
     pub first_vertex: u32,
     /// Cells from west to east and from north to south, 1..=64.
     pub cells: [u32; 2],
-    /// Deviation at each level if no neighbour is coarser; grows with the level, 0 at level 0.
-    pub error: [LevelError; LEVELS],
-    /// Deviation at each level for the worst choice of edges stitched to the next coarser level; grows with the level.
-    pub stitched_error: [LevelError; LEVELS],
-    /// For a chunk with voids: its triangles, as a range of [`Terrain::void_indices`]. Such a chunk is drawn at level 0 only.
-    pub void_indices: Option<Range<u32>>,
-}
-
-impl TerrainChunk {
     /// Whether there is anything to draw.
-    pub fn has_surface(&self) -> bool {
-        self.void_indices.as_ref().is_none_or(|range| !range.is_empty())
-    }
-
-    /// Cells of this chunk's grid at a level, from west to east and from north to south.
-    pub fn cells_at(&self, level: u8) -> [u32; 2] {
-        self.cells.map(|cells| cells.div_ceil(1 << level))
-    }
+    pub has_surface: bool,
+    /// Whether a height is missing. Triangles without it are drawn, at full detail around it.
+    pub has_voids: bool,
 }
 
 /// A grid of heights as drawable chunks.
@@ -105,8 +80,6 @@ pub struct Terrain {
     pub chunk_grid: [u32; 2],
     /// Cells from west to east and from north to south.
     pub cells: [u32; 2],
-    /// Triangles of the chunks with voids; counted from the chunk's first vertex.
-    pub void_indices: Vec<u32>,
     /// Cells with a void corner: half of such a cell may still be there.
     pub void_cells: u64,
     /// The picture on the ground.
@@ -116,6 +89,10 @@ pub struct Terrain {
     /// Box around everything.
     pub bounds: Aabb,
     tree: BlockTree,
+    /// Errors of the hierarchies of all chunks ([`errors::PER_CHUNK`] each), with those of all that needs a vertex.
+    errors: Vec<u16>,
+    /// Largest horizontal deviation of what is judged by squares of each of [`lattice::NODE_CELLS`], metres: next to nothing but on grids that bend.
+    horizontal_m: [f64; lattice::NODE_CELLS.len()],
 }
 
 impl fmt::Debug for Terrain {
@@ -142,8 +119,8 @@ pub enum TerrainError {
         /// Vertices from north to south.
         rows: u32,
     },
-    /// Vertex numbers must fit u32.
-    #[error("a grid of {cols} x {rows} heights is too large: crop or thin it to less than 4 000 000 000 vertices")]
+    /// Numbers of vertices and chunks must fit an index of 32 bits.
+    #[error("a grid of {cols} x {rows} heights is too large: crop or thin it to less than 2 000 000 000 vertices")]
     TooLarge {
         /// Vertices from west to east.
         cols: u32,
@@ -186,4 +163,11 @@ impl Terrain {
         let [column, row] = cell.map(|n| n / CHUNK_CELLS);
         (row * self.chunk_grid[0] + column, cell.map(|n| n % CHUNK_CELLS))
     }
+}
+
+/// The two triangles of cell (a, b) of a chunk, as columns and rows of its vertices: north-west, south-east, north-east and north-west,
+/// south-west, south-east.
+fn cell_triangles([a, b]: [u32; 2]) -> [[[u32; 2]; 3]; 2] {
+    let [nw, ne, sw, se] = [[a, b], [a + 1, b], [a, b + 1], [a + 1, b + 1]];
+    [[nw, se, ne], [nw, sw, se]]
 }

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use camsim_core::{pose::CameraPose, scene::select_lod};
+use camsim_core::{pose::CameraPose, scene::TerrainDetail};
 use glam::DQuat;
 use tiff::{
     encoder::{TiffEncoder, colortype},
@@ -271,21 +271,15 @@ fn sertig_lies_where_it_should() {
         let mut before = u64::MAX;
         for max_error_px in [0.25, 0.5, 1.0, 2.0, 4.0] {
             let begin = std::time::Instant::now();
-            let selection = select_lod(terrain, &camera, [-1.0, 1.0, -0.75, 0.75], 307.6, max_error_px);
-            let microseconds = begin.elapsed().as_secs_f64() * 1e6;
-            let levels: Vec<_> = (0..7).map(|level| selection.draws.iter().filter(|draw| draw.level == level).count()).collect();
+            let mesh = TerrainDetail::new(terrain, &camera, [-1.0, 1.0, -0.75, 0.75], 307.6, max_error_px).mesh();
+            let (lod, microseconds) = (mesh.lod, begin.elapsed().as_secs_f64() * 1e6);
             eprintln!(
-                "{name} {max_error_px} px: chunks by level {levels:?}, {} triangles, {:.3} px, {microseconds:.0} us",
-                selection.triangles, selection.max_error_px
+                "{name} {max_error_px} px: {} chunks, {} triangles, {:.3} px, {microseconds:.0} us",
+                lod.chunks, lod.triangles, lod.max_error_px
             );
-            assert!(selection.max_error_px <= max_error_px && selection.triangles <= before);
-            before = selection.triangles;
+            assert!(lod.max_error_px <= max_error_px && lod.triangles <= before);
+            before = lod.triangles;
         }
-    }
-    for level in 1..7 {
-        let mut errors: Vec<_> = terrain.chunks.iter().map(|chunk| chunk.error[level]).collect();
-        errors.sort_by(|a, b| a.total_m.total_cmp(&b.total_m));
-        eprintln!("level {level}: median error {:?}, largest {:?}", errors[errors.len() / 2], errors[errors.len() - 1]);
     }
 }
 

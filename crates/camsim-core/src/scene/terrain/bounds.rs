@@ -122,6 +122,35 @@ impl BlockTree {
         Node { level: self.levels.len() - 1, at: [0, 0] }
     }
 
+    /// Level of boxes around so many cells along a side: a power of two times [`BLOCK_CELLS`].
+    fn level_of(cells: u32) -> usize {
+        (cells / BLOCK_CELLS).trailing_zeros() as usize
+    }
+
+    /// The box around a square of so many cells, by column and row; `None` beyond the grid. The last one is around everything.
+    pub fn square(&self, cells: u32, at: [i64; 2]) -> Option<&Aabb> {
+        let level = &self.levels[Self::level_of(cells).min(self.levels.len() - 1)];
+        let is_there = (0..2).all(|k| (0..i64::from(level.size[k])).contains(&at[k]));
+        is_there.then(|| level.get(at.map(|n| n as u32)))
+    }
+
+    /// Visits the squares of so many cells along a side whose boxes, and those around them, are accepted.
+    pub fn visit(&self, cells: u32, accept: &dyn Fn(&Aabb) -> bool, found: &mut dyn FnMut([u32; 2], &Aabb)) {
+        let level = Self::level_of(cells);
+        let mut stack = vec![self.root()];
+        while let Some(node) = stack.pop() {
+            let bounds = self.bounds(node);
+            if !accept(bounds) {
+                continue;
+            }
+            if node.level <= level {
+                found(node.at, bounds);
+            } else {
+                stack.extend(self.children(node));
+            }
+        }
+    }
+
     pub fn bounds(&self, node: Node) -> &Aabb {
         self.levels[node.level].get(node.at)
     }

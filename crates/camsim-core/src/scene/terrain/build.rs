@@ -6,10 +6,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Aabb, CHUNK_CELLS, LEVELS, LevelError, Terrain, TerrainChunk, TerrainError, TerrainVertex,
+    Aabb, CHUNK_CELLS, Terrain, TerrainChunk, TerrainError, TerrainVertex,
     bounds::{BLOCK_CELLS, BlockTree},
-    errors::{ChunkGrid, level_errors},
-    stitch::cell_triangles,
+    cell_triangles,
+    errors::{self, ChunkErrors, ChunkGrid, chunk_errors},
+    select::VERTEX_BITS,
 };
 use crate::scene::{Encoding, Texture};
 
@@ -53,7 +54,7 @@ impl Place {
 struct Part {
     chunk: TerrainChunk,
     vertices: Vec<TerrainVertex>,
-    void_indices: Option<Vec<u32>>,
+    errors: ChunkErrors,
     void_cells: u64,
 }
 
@@ -81,25 +82,26 @@ impl Terrain {
             chunks: Vec::with_capacity(parts.len()),
             chunk_grid,
             cells,
-            void_indices: Vec::new(),
+            errors: Vec::with_capacity(parts.iter().map(|p| p.errors.keys.len()).sum()),
+            horizontal_m: Default::default(),
             void_cells: 0,
             texture,
             quantum_m,
             bounds: Aabb::EMPTY,
             tree: BlockTree::new([1, 1], vec![Aabb::EMPTY]),
         };
-        for mut part in parts {
-            if let Some(indices) = part.void_indices {
-                let start = terrain.void_indices.len() as u32;
-                terrain.void_indices.extend(indices);
-                part.chunk.void_indices = Some(start..terrain.void_indices.len() as u32);
+        for part in parts {
+            for (largest_m, part_m) in terrain.horizontal_m.iter_mut().zip(part.errors.horizontal_m) {
+                *largest_m = largest_m.max(part_m);
             }
+            terrain.errors.extend(part.errors.keys);
             terrain.void_cells += part.void_cells;
             terrain.bounds = terrain.bounds.union(&part.chunk.bounds);
             terrain.vertices.extend(part.vertices);
             terrain.chunks.push(part.chunk);
         }
-        if !terrain.chunks.iter().any(TerrainChunk::has_surface) {
+        errors::saturate(&mut terrain.errors, chunk_grid);
+        if !terrain.chunks.iter().any(|chunk| chunk.has_surface) {
             return Err(TerrainError::AllVoid);
         }
         terrain.tree = terrain.block_tree();
@@ -175,6 +177,10 @@ fn check(grid: &PointGrid<'_>) -> Result<(), TerrainError> {
 }
 
 fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainError> {
+    let [cols, rows] = cells.map(|n| n + 1);
+    if u64::from(chunk_grid[0]) * u64::from(chunk_grid[1]) > 1 << (u32::BITS - VERTEX_BITS) {
+        return Err(TerrainError::TooLarge { cols, rows });
+    }
     let mut places = Vec::new();
     let mut first_vertex = 0u32;
     for y in 0..chunk_grid[1] {
@@ -183,7 +189,6 @@ fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainEr
             let size = [0, 1].map(|k: usize| (cells[k] - first_cell[k]).min(CHUNK_CELLS));
             places.push(Place { first_cell, cells: size, first_vertex });
             let count = (size[0] + 1) * (size[1] + 1);
-            let [cols, rows] = cells.map(|n| n + 1);
             first_vertex = first_vertex.checked_add(count).ok_or(TerrainError::TooLarge { cols, rows })?;
         }
     }
@@ -238,35 +243,29 @@ fn part(grid: &PointGrid<'_>, place: Place, bounds: &Aabb, quantum_m: f64) -> Pa
         })
         .collect();
 
-    let mut chunk = TerrainChunk {
+    let (triangles, void_cells) = count_without_voids(place.cells, &vertices);
+    let chunk = TerrainChunk {
         centre_ned_m,
         bounds: exact_bounds,
         first_vertex: place.first_vertex,
         cells: place.cells,
-        error: [LevelError::default(); LEVELS],
-        stitched_error: [LevelError::default(); LEVELS],
-        void_indices: None,
+        has_surface: triangles > 0,
+        has_voids: vertices.iter().any(|vertex| vertex.offset_m[0].is_nan()),
     };
-    if vertices.iter().any(|vertex| vertex.offset_m[0].is_nan()) {
-        let (indices, void_cells) = triangles_without_voids(place.cells, &vertices);
-        return Part { chunk, vertices, void_indices: Some(indices), void_cells };
-    }
-    (chunk.error, chunk.stitched_error) = level_errors(&ChunkGrid { cells: place.cells, vertices: &vertices });
-    Part { chunk, vertices, void_indices: None, void_cells: 0 }
+    let errors = chunk_errors(&ChunkGrid { cells: place.cells, vertices: &vertices });
+    Part { chunk, vertices, errors, void_cells }
 }
 
 /// Triangles with three valid corners, and the number of cells that lost one or both.
-fn triangles_without_voids(cells: [u32; 2], vertices: &[TerrainVertex]) -> (Vec<u32>, u64) {
-    let mut indices = Vec::new();
-    let mut void_cells = 0;
+fn count_without_voids(cells: [u32; 2], vertices: &[TerrainVertex]) -> (u64, u64) {
+    let (mut triangles, mut void_cells) = (0, 0);
     for b in 0..cells[1] {
         for a in 0..cells[0] {
-            let triangles = cell_triangles([a, b], cells, 0, [0; 4]).map(|t| t.map(|[i, j]| j * (cells[0] + 1) + i));
-            let is_valid = |t: &&[u32; 3]| t.iter().all(|&v| !vertices[v as usize].offset_m[0].is_nan());
-            let before = indices.len();
-            indices.extend(triangles.iter().filter(is_valid).flatten());
-            void_cells += u64::from(indices.len() - before < 6);
+            let is_valid = |t: &[[u32; 2]; 3]| t.iter().all(|[i, j]| !vertices[(j * (cells[0] + 1) + i) as usize].offset_m[0].is_nan());
+            let valid = cell_triangles([a, b]).iter().filter(|t| is_valid(t)).count();
+            triangles += valid as u64;
+            void_cells += u64::from(valid < 2);
         }
     }
-    (indices, void_cells)
+    (triangles, void_cells)
 }

@@ -1,8 +1,32 @@
-//! How far a chunk's surface at a level is from the full one: exact, over the corners of the overlay of both triangulations.
+//! How far the full surface is from the triangles of the hierarchy: exact, over the corners of the overlay of both triangulations.
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::{LEVELS, LevelError, TerrainVertex, stitch::cell_triangles};
+use super::{
+    TerrainVertex,
+    lattice::{self, CELLS, DEPTHS, LATTICE, NODE_CELLS, ROOTS, SIDE, VERTICES},
+};
+
+/// Errors of a chunk: of its vertices, then of its cells.
+pub(super) const PER_CHUNK: usize = VERTICES + CELLS;
+
+/// A void is near: whatever the tolerance, the triangle is halved.
+pub(super) const VOID: u16 = u16::MAX;
+
+/// An error in metres as a number that orders as errors do: the upper half of its f32, rounded up (by 0.8 % at most). 0 stands for what
+/// is more exact than an exact surface.
+pub(super) fn key_of_error(metres: f64) -> u16 {
+    // Rounded up twice: a bound must stay one.
+    let bits = if metres > 0.0 { (metres as f32).next_up().min(f32::MAX).to_bits() } else { 0 };
+    bits.div_ceil(1 << 16) as u16 + 1
+}
+
+/// A tolerance in metres as such a number, rounded down; 0 for one that not even an exact surface keeps.
+pub(super) fn key_of_tolerance(metres: f64) -> u16 {
+    // NaN keeps nothing.
+    if metres >= 0.0 { ((metres as f32).next_down().max(0.0).to_bits() >> 16) as u16 + 1 } else { 0 }
+}
 
 /// A chunk's full grid.
 pub(super) struct ChunkGrid<'a> {
@@ -11,81 +35,92 @@ pub(super) struct ChunkGrid<'a> {
     pub vertices: &'a [TerrainVertex],
 }
 
-/// Squares of the two parts of a [`LevelError`].
+/// Deviation of points of the full surface from those of a coarser one at equal grid coordinates.
 #[derive(Clone, Copy, Default)]
 struct Worst {
-    total2: f64,
+    /// Of the down coordinate.
+    vertical: f64,
+    /// Square of that in the north-east plane.
     horizontal2: f64,
 }
 
 impl Worst {
     fn add(&mut self, deviation: DVec3) {
-        let horizontal2 = deviation.x * deviation.x + deviation.y * deviation.y;
-        self.horizontal2 = self.horizontal2.max(horizontal2);
-        self.total2 = self.total2.max(horizontal2 + deviation.z * deviation.z);
-    }
-
-    fn max(self, other: Self) -> Self {
-        Self { total2: self.total2.max(other.total2), horizontal2: self.horizontal2.max(other.horizontal2) }
-    }
-
-    /// Rounded up: a bound must stay one in f32.
-    fn to_error(self) -> LevelError {
-        let up = |squared: f64| if squared > 0.0 { (squared.sqrt() as f32).next_up() } else { 0.0 };
-        LevelError { total_m: up(self.total2), horizontal_m: up(self.horizontal2) }
+        // Voids are no numbers, and no matter.
+        self.vertical = self.vertical.max(deviation.z.abs());
+        self.horizontal2 = self.horizontal2.max(deviation.x * deviation.x + deviation.y * deviation.y);
     }
 }
 
-/// (unstitched, worst stitching) for each level, both growing with the level. The grid must hold no voids.
-pub(super) fn level_errors(grid: &ChunkGrid<'_>) -> ([LevelError; LEVELS], [LevelError; LEVELS]) {
-    let mut flat = [LevelError::default(); LEVELS];
-    let mut stitched = [LevelError::default(); LEVELS];
-    let (mut worst_flat, mut worst_stitched) = (Worst::default(), Worst::default());
-    for level in 0..LEVELS as u8 {
-        let (inner, ring) = level_error(grid, level);
-        worst_flat = worst_flat.max(inner).max(ring[0]);
-        worst_stitched = worst_stitched.max(worst_flat).max(ring[1]).max(ring[2]).max(ring[3]);
-        flat[level as usize] = worst_flat.to_error();
-        stitched[level as usize] = worst_stitched.to_error();
-    }
-    (flat, stitched)
+/// What one chunk knows about its errors.
+pub(super) struct ChunkErrors {
+    /// [`PER_CHUNK`] numbers, of the triangles within this chunk alone: [`saturate`] makes them those of everything that needs a vertex.
+    pub keys: Vec<u16>,
+    /// Largest horizontal deviation of what is judged by squares of each of [`NODE_CELLS`].
+    pub horizontal_m: [f64; NODE_CELLS.len()],
 }
 
-/// Deviation of the cells away from the border, and of the cells on the border for four ways of stitching: none, north and south, east
-/// and west, all. A border cell touches one edge, or two at a corner: these four show it every combination that any of the sixteen has.
-fn level_error(grid: &ChunkGrid<'_>, level: u8) -> (Worst, [Worst; 4]) {
-    let [nx, ny] = grid.cells.map(|n| n.div_ceil(1 << level));
-    let coarser = level + 1;
-    let edge_levels = [[level; 4], [coarser, level, coarser, level], [level, coarser, level, coarser], [coarser; 4]];
-    // The coarsest level has no coarser neighbour.
-    let ways = if usize::from(coarser) < LEVELS { 4 } else { 1 };
-    let (mut inner, mut ring) = (Worst::default(), [Worst::default(); 4]);
-    for b in 0..ny {
-        for a in 0..nx {
-            let on_border = a == 0 || b == 0 || a + 1 == nx || b + 1 == ny;
-            if on_border {
-                for way in 0..ways {
-                    for triangle in cell_triangles([a, b], grid.cells, level, edge_levels[way]) {
-                        triangle_error(grid, triangle, &mut ring[way]);
-                    }
-                }
-            } else if level > 0 {
-                for triangle in cell_triangles([a, b], grid.cells, level, edge_levels[0]) {
-                    triangle_error(grid, triangle, &mut inner);
-                }
-            }
+/// Errors of the triangles of one chunk.
+pub(super) fn chunk_errors(grid: &ChunkGrid<'_>) -> ChunkErrors {
+    let mut errors = ChunkErrors { keys: vec![key_of_error(0.0); PER_CHUNK], horizontal_m: [0.0; NODE_CELLS.len()] };
+    for root in ROOTS {
+        add_triangle(grid, root, 0, &mut errors);
+    }
+    for j in 0..grid.cells[1] {
+        for i in 0..grid.cells[0] {
+            add_cell(grid, [i, j], &mut errors);
         }
     }
-    (inner, ring)
+    for size in 1..NODE_CELLS.len() {
+        errors.horizontal_m[size] = errors.horizontal_m[size].max(errors.horizontal_m[size - 1]);
+    }
+    errors
 }
 
-fn triangle_error(grid: &ChunkGrid<'_>, triangle: [[u32; 2]; 3], worst: &mut Worst) {
-    let corners = triangle.map(|p| p.map(|n| n as i32));
+fn add_triangle(grid: &ChunkGrid<'_>, triangle: [u32; 3], depth: u32, errors: &mut ChunkErrors) {
+    let corners = triangle.map(|vertex| {
+        let [i, j] = lattice::place(vertex);
+        [i.min(grid.cells[0]) as i32, j.min(grid.cells[1]) as i32]
+    });
+    let (middle, halves) = lattice::halves(triangle);
+    let worst = triangle_error(grid, corners);
+    let key = &mut errors.keys[middle as usize];
+    *key = key_of_error(worst.vertical).max(*key);
+    let horizontal_m = &mut errors.horizontal_m[lattice::node_size(depth)];
+    *horizontal_m = horizontal_m.max(worst.horizontal2.sqrt());
+    if depth + 1 < DEPTHS {
+        halves.into_iter().for_each(|half| add_triangle(grid, half, depth + 1, errors));
+    }
+}
+
+fn add_cell(grid: &ChunkGrid<'_>, [i, j]: [u32; 2], errors: &mut ChunkErrors) {
+    let [nw, ne, sw, se] = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[a, b]| grid.at(i as i32 + a, j as i32 + b));
+    let north_west = j * SIDE + i;
+    let to_turn = north_west % 2 == 1;
+    if !(nw + ne + sw + se).is_finite() {
+        if to_turn {
+            errors.keys[VERTICES + north_west as usize / 2] = VOID;
+        } else {
+            // Its own diagonal is that of the halves: they have their right angles here.
+            for vertex in [north_west + 1, north_west + SIDE] {
+                errors.keys[vertex as usize] = VOID;
+            }
+        }
+    } else if to_turn {
+        let mut worst = Worst::default();
+        worst.add(0.5 * (nw + se - ne - sw));
+        errors.keys[VERTICES + north_west as usize / 2] = key_of_error(worst.vertical);
+        errors.horizontal_m[0] = errors.horizontal_m[0].max(worst.horizontal2.sqrt());
+    }
+}
+
+/// Corners are vertices of the chunk; where it is smaller than 64x64 cells they were moved to its border, and form any kind of triangle.
+fn triangle_error(grid: &ChunkGrid<'_>, corners: [[i32; 2]; 3]) -> Worst {
+    let mut worst = Worst::default();
     let cross = |a: [i32; 2], b: [i32; 2], p: [i32; 2]| (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]);
     let area2 = cross(corners[0], corners[1], corners[2]);
-    // 1: half of a grid cell, which is a triangle of the full surface if its diagonal runs the same way.
-    if area2 == 0 || (area2 == -1 && is_full_triangle(corners)) {
-        return;
+    if area2 == 0 {
+        return worst;
     }
     let points = corners.map(|p| grid.at(p[0], p[1]));
     let axis = |k: usize| {
@@ -107,17 +142,9 @@ fn triangle_error(grid: &ChunkGrid<'_>, triangle: [[u32; 2]; 3], worst: &mut Wor
         }
     }
     for k in 0..3 {
-        edge_error(grid, corners[k], corners[(k + 1) % 3], points[k], points[(k + 1) % 3], worst);
+        edge_error(grid, corners[k], corners[(k + 1) % 3], points[k], points[(k + 1) % 3], &mut worst);
     }
-}
-
-/// Whether a triangle of half a cell has its long side from north-west to south-east.
-fn is_full_triangle(corners: [[i32; 2]; 3]) -> bool {
-    (0..3).any(|k| {
-        let [a, b] = [corners[k], corners[(k + 1) % 3]];
-        let step = [b[0] - a[0], b[1] - a[1]];
-        step[0] == step[1] && step[0].abs() == 1
-    })
+    worst
 }
 
 /// Deviation where an edge p-q of a coarse triangle crosses the lines of the full grid between its vertices.
@@ -167,5 +194,60 @@ impl ChunkGrid<'_> {
     fn between(&self, from: [i32; 2], step: [i32; 2], share: f64) -> DVec3 {
         let start = self.at(from[0], from[1]);
         if share == 0.0 { start } else { start.lerp(self.at(from[0] + step[0], from[1] + step[1]), share) }
+    }
+}
+
+/// Raises the error of each vertex to that of all vertices and cells that need it, chunk borders included: what is exact enough at a
+/// vertex then is so at all of them. `keys` holds [`PER_CHUNK`] numbers of each chunk.
+pub(super) fn saturate(keys: &mut [u16], chunk_grid: [u32; 2]) {
+    for depth in (0..DEPTHS).rev() {
+        keys.par_chunks_exact_mut(PER_CHUNK).for_each(|chunk| {
+            for &vertex in &LATTICE.by_depth[depth as usize] {
+                let [i, j] = lattice::place(vertex).map(|n| n as i32);
+                chunk[vertex as usize] = needing(depth).iter().fold(chunk[vertex as usize], |worst, [di, dj]| {
+                    let [i, j] = [i + di, j + dj];
+                    let cells = if depth + 1 < DEPTHS { 0..=SIDE as i32 - 1 } else { 0..=SIDE as i32 - 2 };
+                    if !cells.contains(&i) || !cells.contains(&j) {
+                        return worst;
+                    }
+                    let other = (j * SIDE as i32 + i) as usize;
+                    worst.max(chunk[if depth + 1 < DEPTHS { other } else { VERTICES + other / 2 }])
+                });
+            }
+        });
+        if !depth.is_multiple_of(2) {
+            share_borders(keys, chunk_grid, depth);
+        }
+    }
+}
+
+/// Where the vertices are that need one of a depth; at the last depth the cells, by their north-west vertices.
+fn needing(depth: u32) -> [[i32; 2]; 4] {
+    let step = 32 >> (depth / 2);
+    match depth {
+        11 => [[0, 0], [-1, -1], [0, 0], [-1, -1]],
+        _ if depth.is_multiple_of(2) => [[step, 0], [0, step], [-step, 0], [0, -step]],
+        _ => [[step / 2, step / 2], [-step / 2, step / 2], [-step / 2, -step / 2], [step / 2, -step / 2]],
+    }
+}
+
+/// Gives vertices of two chunks the larger of their errors.
+fn share_borders(keys: &mut [u16], [columns, rows]: [u32; 2], depth: u32) {
+    let step = (32 >> (depth / 2)) as usize;
+    let side = SIDE as usize;
+    let mut share = |a: usize, b: usize| {
+        let worst = keys[a].max(keys[b]);
+        (keys[a], keys[b]) = (worst, worst);
+    };
+    for chunk in 0..(columns * rows) as usize {
+        let (first, along) = (chunk * PER_CHUNK, columns as usize);
+        for at in (step..side).step_by(2 * step) {
+            if !(chunk + 1).is_multiple_of(along) {
+                share(first + at * side + side - 1, first + PER_CHUNK + at * side);
+            }
+            if chunk + along < along * rows as usize {
+                share(first + (side - 1) * side + at, first + along * PER_CHUNK + at);
+            }
+        }
     }
 }

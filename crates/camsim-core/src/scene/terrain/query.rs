@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{
-    ChunkDraw, Terrain,
+    Terrain,
     bounds::{BLOCK_CELLS, Node, inverse},
-    stitch::cell_triangles,
+    cell_triangles,
 };
 use crate::pose::CameraPose;
 
@@ -55,30 +55,6 @@ impl Terrain {
             }
         }
         best
-    }
-
-    /// Ray parameter at which a ray that meets the full surface at `hit` meets the surface as `draw` shows that chunk: the plane of the
-    /// coarser triangle over the hit. Exact where the two surfaces are met in one coarse cell; beyond its border, and where a border is stitched,
-    /// that plane is continued.
-    pub fn drawn_t(&self, hit: &TerrainHit, draw: &ChunkDraw, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
-        let chunk = &self.chunks[draw.chunk as usize];
-        if draw.level == 0 && draw.edge_levels == [0; 4] {
-            return hit.t;
-        }
-        let cell = hit.cell.map(|at| at >> draw.level);
-        let mut best = (f64::NEG_INFINITY, hit.t);
-        for corners in cell_triangles(cell, chunk.cells, draw.level, draw.edge_levels) {
-            let [a, b, c] = corners.map(|[i, j]| self.position_ned_m(draw.chunk, i, j) - origin_ned_m);
-            let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
-            let normal = (b - a).cross(c - a);
-            // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which never is the best.
-            let inside = wa.min(wb).min(wc).max(-wa.max(wb).max(wc)) / (wa + wb + wc).abs();
-            let t = a.dot(normal) / direction_ned.dot(normal);
-            if inside > best.0 && t > 0.0 {
-                best = (inside, t);
-            }
-        }
-        best.1
     }
 
     /// The full surface at a place of the tangent plane: the down coordinate of the topmost point, `None` off the terrain.
@@ -158,7 +134,7 @@ impl Terrain {
         let chunk = &self.chunks[chunk_index as usize];
         let mut best = None;
         let mut limit = t_max;
-        for corners in cell_triangles(cell, chunk.cells, 0, [0; 4]) {
+        for corners in cell_triangles(cell) {
             let points = corners.map(|[i, j]| self.position_ned_m(chunk_index, i, j));
             let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
             limit = t;
@@ -211,6 +187,7 @@ pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: D
 }
 
 /// Half-spaces that a camera sees.
+#[derive(Debug)]
 pub(crate) struct Frustum {
     position_ned_m: DVec3,
     /// Inward normals, NED.

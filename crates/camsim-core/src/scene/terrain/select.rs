@@ -1,135 +1,254 @@
-//! Which chunks to draw at which level: a pure function of camera and terrain.
+//! Which triangles to draw.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
-use super::{Aabb, LEVELS, LevelError, Terrain, TerrainChunk, query::Frustum};
-use crate::pose::CameraPose;
+use super::{
+    TerrainDetail, TerrainHit,
+    detail::Tolerances,
+    lattice::{self, BLOCK_DEPTH, DEPTHS, LATTICE, Lattice, NODE_CELLS, ROOTS, SIDE, VERTICES},
+};
 
-/// One chunk to draw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ChunkDraw {
-    /// Index in [`Terrain::chunks`].
-    pub chunk: u32,
-    /// Level of detail. A chunk with voids has level 0 and is drawn by its own indices.
-    pub level: u8,
-    /// Levels of the neighbours in the north, east, south and west, where they are coarser; else `level`.
-    pub edge_levels: [u8; 4],
-}
+/// Bits of an index that are a vertex's number in its chunk; those above are the place of the chunk in [`TerrainMesh::chunks`].
+pub const VERTEX_BITS: u32 = 13;
 
-/// What to draw, and what that costs.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// What was drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LodSelection {
-    /// Chunks in sight, by index.
-    pub draws: Vec<ChunkDraw>,
-    /// Triangles of all of them, degenerate ones included.
+    /// Chunks in sight.
+    pub chunks: usize,
+    /// Triangles in sight.
     pub triangles: u64,
     /// Bound on the displacement of any visible surface point in the ideal frame, pixels.
     pub max_error_px: f64,
 }
 
-/// How a camera sees the errors of one chunk.
-#[derive(Clone, Copy, Debug)]
-struct View {
-    /// Pixels per metre of displacement across the line of sight, at most.
-    px_per_m: f64,
-    /// Sine of the angle between line of sight and vertical, at most.
-    sine: f64,
+/// Triangles in sight.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TerrainMesh {
+    /// Chunks in sight, by number.
+    pub chunks: Vec<u32>,
+    /// Three corners a triangle: `place in chunks << VERTEX_BITS | vertex`, vertices counted from the chunk's first.
+    pub indices: Vec<u32>,
+    /// What that comes to.
+    pub lod: LodSelection,
 }
 
-impl View {
-    /// A deviation of `total_m`, of which `horizontal_m` is horizontal, moves a point across the line of sight by its vertical part times
-    /// the sine, plus its horizontal part.
-    fn error_px(&self, error: LevelError) -> f64 {
-        let (total, horizontal) = (f64::from(error.total_m), f64::from(error.horizontal_m));
-        let across = (total * self.sine + horizontal).min(total);
-        // 0 * infinity: an exact surface is exact from anywhere.
-        if across == 0.0 { 0.0 } else { across * self.px_per_m }
-    }
-}
-
-/// Chooses for each chunk in sight the coarsest level whose error stays within `max_error_px`.
-///
-/// `tangents` = [u_min, u_max, v_min, v_max] of the ideal frame (u = x/z, v = y/z in the optical frame), `focal_px` its larger focal
-/// length. The bound is conservative: smallest distance of the chunk's box, largest distance from the principal axis within the frame,
-/// vertical errors seen from the side. Neighbours in sight differ by one level at most, and chunks with voids (always complete) are
-/// surrounded by complete ones. Level 0 is exact, so any tolerance can be kept.
-pub fn select_lod(terrain: &Terrain, camera: &CameraPose, tangents: [f64; 4], focal_px: f64, max_error_px: f64) -> LodSelection {
-    let frustum = Frustum::new(camera, tangents);
-    let radius2_max = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
-    let views: Vec<Option<View>> = terrain
-        .chunks
-        .iter()
-        .map(|chunk| (chunk.has_surface() && frustum.may_see(&chunk.bounds)).then(|| view(&chunk.bounds, camera, focal_px, radius2_max)))
-        .collect();
-    let mut levels: Vec<u8> = terrain.chunks.iter().zip(&views).map(|(chunk, view)| wanted_level(chunk, *view, max_error_px)).collect();
-    settle(terrain, &views, &mut levels, max_error_px);
-
-    let mut selection = LodSelection::default();
-    for (index, chunk) in terrain.chunks.iter().enumerate() {
-        let Some(view) = views[index] else { continue };
-        let level = levels[index];
-        let edge_levels = neighbours(terrain, index).map(|n| match n {
-            Some(n) if views[n].is_some() => levels[n].max(level),
-            _ => level,
-        });
-        let is_stitched = edge_levels.iter().any(|&edge| edge > level);
-        let error = if is_stitched { chunk.stitched_error[level as usize] } else { chunk.error[level as usize] };
-        selection.max_error_px = selection.max_error_px.max(view.error_px(error));
-        selection.triangles += match &chunk.void_indices {
-            Some(range) => (range.len() / 3) as u64,
-            None => chunk.cells_at(level).iter().map(|&n| u64::from(n)).product::<u64>() * 2,
+impl TerrainDetail<'_> {
+    /// The triangles to draw, in the order of the chunks.
+    pub fn mesh(&self) -> TerrainMesh {
+        let parts: Vec<(Vec<u32>, Option<i32>)> = self
+            .in_sight
+            .par_iter()
+            .enumerate()
+            .map_init(
+                || Tolerances::new(0),
+                |known, (place, &chunk)| {
+                    known.reset(chunk);
+                    self.chunk_mesh(known, place as u32, chunk)
+                },
+            )
+            .collect();
+        let nearest = parts.iter().filter_map(|part| part.1).max();
+        let mut indices = Vec::with_capacity(parts.iter().map(|part| part.0.len()).sum());
+        parts.iter().for_each(|part| indices.extend_from_slice(&part.0));
+        let lod = LodSelection {
+            chunks: self.in_sight.len(),
+            triangles: indices.len() as u64 / 3,
+            max_error_px: nearest.map_or(0.0, |steps| self.error_px(steps)),
         };
-        selection.draws.push(ChunkDraw { chunk: index as u32, level, edge_levels });
+        TerrainMesh { chunks: self.in_sight.clone(), indices, lod }
     }
-    selection
-}
 
-fn view(bounds: &Aabb, camera: &CameraPose, focal_px: f64, radius2_max: f64) -> View {
-    let from_camera = Aabb { min: bounds.min - camera.position_ned_m, max: bounds.max - camera.position_ned_m };
-    let distance_m = bounds.distance_m(camera.position_ned_m);
-    // Farthest from the principal axis: the box lies within a cone about its middle.
-    let centre = from_camera.centre();
-    let half_angle = (0.5 * (bounds.max - bounds.min).length() / centre.length()).min(1.0).asin();
-    let axis = camera.ned_from_camera * DVec3::Z;
-    let off_axis = axis.angle_between(centre) + half_angle;
-    let radius2 = if off_axis < std::f64::consts::FRAC_PI_2 { off_axis.tan().powi(2).min(radius2_max) } else { radius2_max };
-    // d(tan a) = (1 + tan^2 a) da.
-    let px_per_m = focal_px * (1.0 + radius2) / distance_m;
-    let aside = from_camera.min.abs().max(from_camera.max.abs());
-    let below = from_camera.min.z.max(-from_camera.max.z).max(0.0);
-    let sine = aside.x.hypot(aside.y) / aside.x.hypot(aside.y).hypot(below);
-    View { px_per_m, sine: if sine.is_finite() { sine } else { 1.0 } }
-}
-
-fn wanted_level(chunk: &TerrainChunk, view: Option<View>, max_error_px: f64) -> u8 {
-    let Some(view) = view else { return LEVELS as u8 - 1 };
-    if chunk.void_indices.is_some() {
-        return 0;
+    /// Bound on the displacement by errors that are `steps` below their tolerances. A step is 1/128 of an octave along each octave's chord,
+    /// which is off by a factor of 1.0615 at most; and displacement grows at least in proportion to the error.
+    fn error_px(&self, steps: i32) -> f64 {
+        let share = 1.0615 * (f64::from(steps) / 128.0).exp2();
+        (share * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
-    (1..LEVELS).rev().find(|&level| view.error_px(chunk.error[level]) <= max_error_px).unwrap_or(0) as u8
-}
 
-/// Lowers levels until neighbours fit and stitched borders keep the tolerance. Levels only fall, so this ends.
-fn settle(terrain: &Terrain, views: &[Option<View>], levels: &mut [u8], max_error_px: f64) {
-    let mut queue: Vec<usize> = (0..levels.len()).filter(|&index| views[index].is_some()).collect();
-    while let Some(index) = queue.pop() {
-        let (chunk, Some(view)) = (&terrain.chunks[index], views[index]) else { continue };
-        let level = levels[index];
-        // A border of voids cannot move, and a stitched border has an error of its own.
-        let may_stitch = chunk.void_indices.is_none() && view.error_px(chunk.stitched_error[level as usize]) <= max_error_px;
-        let cap = level + u8::from(may_stitch);
-        for neighbour in neighbours(terrain, index).into_iter().flatten() {
-            if views[neighbour].is_some() && levels[neighbour] > cap {
-                levels[neighbour] = cap;
-                queue.push(neighbour);
+    fn chunk_mesh(&self, known: &Tolerances, place: u32, chunk: u32) -> (Vec<u32>, Option<i32>) {
+        let mut walk = Walk { judged: Judged::new(self, known, chunk), emit: Emit::new(self, place, chunk), nearest: None };
+        ROOTS.into_iter().for_each(|root| walk.triangle(root, 0));
+        (walk.emit.indices, walk.nearest)
+    }
+
+    /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn there instead: the plane of that over or
+    /// under the hit's cell which the ray passes deepest inside. Where the ray leaves that cell's triangles before it meets them, their planes are continued.
+    pub fn drawn_t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
+        let chunk = &self.terrain.chunks[hit.chunk as usize];
+        let Some(known) = self.tolerances(hit.chunk) else { return hit.t };
+        let judged = Judged::new(self, known, hit.chunk);
+        let mut best = (f64::NEG_INFINITY, hit.t);
+        let mut stack: Vec<([u32; 3], u32)> = ROOTS.map(|root| (root, 0)).to_vec();
+        while let Some((triangle, depth)) = stack.pop() {
+            let corners = triangle.map(|vertex| {
+                let [i, j] = lattice::place(vertex);
+                [i.min(chunk.cells[0]), j.min(chunk.cells[1])]
+            });
+            let beside = |axis: usize| {
+                let along = corners.map(|corner| corner[axis]);
+                hit.cell[axis] >= along.into_iter().fold(0, u32::max) || hit.cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
+            };
+            if beside(0) || beside(1) {
+                continue;
             }
+            if depth < DEPTHS {
+                let (middle, halves) = lattice::halves(triangle);
+                if judged.vertex(middle).is_needed() {
+                    stack.extend(halves.map(|half| (half, depth + 1)));
+                    continue;
+                }
+            } else if lattice::cell_to_turn(triangle).is_none_or(|cell| judged.cell(cell).is_needed()) {
+                // The full surface itself.
+                return hit.t;
+            }
+            let [a, b, c] = corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j) - origin_ned_m);
+            let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
+            let normal = (b - a).cross(c - a);
+            // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which never is the best.
+            let inside = wa.min(wb).min(wc).max(-wa.max(wb).max(wc)) / (wa + wb + wc).abs();
+            let t = a.dot(normal) / direction_ned.dot(normal);
+            if inside > best.0 && t > 0.0 {
+                best = (inside, t);
+            }
+        }
+        best.1
+    }
+}
+
+/// Errors of one chunk's vertices and cells, and what they may be.
+struct Judged<'a> {
+    detail: &'a TerrainDetail<'a>,
+    known: &'a Tolerances,
+    errors: &'a [u16],
+    /// None of the tolerances is below this: what keeps it need not be looked at any closer.
+    strictest: u16,
+    lattice: &'static Lattice,
+}
+
+struct Judgement {
+    error: u16,
+    tolerance: u16,
+}
+
+impl Judgement {
+    fn is_needed(&self) -> bool {
+        self.error > self.tolerance
+    }
+}
+
+impl<'a> Judged<'a> {
+    fn new(detail: &'a TerrainDetail<'_>, known: &'a Tolerances, chunk: u32) -> Self {
+        Self { detail, known, errors: detail.errors(chunk), strictest: detail.of_root(known), lattice: &LATTICE }
+    }
+
+    #[inline]
+    fn vertex(&self, vertex: u32) -> Judgement {
+        self.judge(self.errors[vertex as usize], self.lattice.set_of_vertex[vertex as usize])
+    }
+
+    #[inline]
+    fn cell(&self, cell: u32) -> Judgement {
+        self.judge(self.errors[VERTICES + cell as usize / 2], self.lattice.set_of_cell[cell as usize / 2])
+    }
+
+    #[inline]
+    fn judge(&self, error: u16, set: u16) -> Judgement {
+        let tolerance = if error <= self.strictest { self.strictest } else { self.detail.of_set(self.known, set) };
+        Judgement { error, tolerance }
+    }
+}
+
+/// Down the hierarchy of one chunk.
+struct Walk<'a> {
+    judged: Judged<'a>,
+    emit: Emit<'a>,
+    /// Steps that the error nearest to its tolerance is below it; `None` while all is exact.
+    nearest: Option<i32>,
+}
+
+impl Walk<'_> {
+    fn triangle(&mut self, triangle: [u32; 3], depth: u32) {
+        if depth == BLOCK_DEPTH && !self.judged.detail.block_in_sight(self.judged.known, north_west(triangle)) {
+            return;
+        }
+        if depth == DEPTHS {
+            return self.half_cell(triangle);
+        }
+        let (middle, [first, second]) = lattice::halves(triangle);
+        let judgement = self.judged.vertex(middle);
+        if judgement.is_needed() {
+            self.triangle(first, depth + 1);
+            self.triangle(second, depth + 1);
+        } else {
+            self.note(judgement);
+            self.emit.triangle(triangle);
+        }
+    }
+
+    fn half_cell(&mut self, triangle: [u32; 3]) {
+        let Some(cell) = lattice::cell_to_turn(triangle) else { return self.emit.triangle(triangle) };
+        let judgement = self.judged.cell(cell);
+        if judgement.is_needed() {
+            self.emit.triangle(lattice::turned(triangle, cell));
+        } else {
+            self.note(judgement);
+            self.emit.triangle(triangle);
+        }
+    }
+
+    fn note(&mut self, Judgement { error, tolerance }: Judgement) {
+        // 1 is exact.
+        if error > 1 {
+            self.nearest = self.nearest.max(Some(i32::from(error) - i32::from(tolerance)));
         }
     }
 }
 
-/// Chunks in the north, east, south and west.
-fn neighbours(terrain: &Terrain, index: usize) -> [Option<usize>; 4] {
-    let [cols, rows] = terrain.chunk_grid.map(|n| n as usize);
-    let (x, y) = (index % cols, index / cols);
-    [(y > 0).then(|| index - cols), (x + 1 < cols).then_some(index + 1), (y + 1 < rows).then_some(index + cols), (x > 0).then(|| index - 1)]
+/// The corner of the square of 8x8 cells of which a triangle is half.
+fn north_west([a, b, _]: [u32; 3]) -> u32 {
+    let size = NODE_CELLS[0];
+    // The longest side runs from north-west to south-east or from north-east to south-west.
+    if a.abs_diff(b) == size * (SIDE + 1) { a.min(b) } else { a.min(b) - size }
+}
+
+/// Writes triangles of one chunk.
+struct Emit<'a> {
+    indices: Vec<u32>,
+    base: u32,
+    /// For a chunk that is smaller than the lattice or has voids: what its vertices are.
+    odd: Option<OddChunk<'a>>,
+}
+
+struct OddChunk<'a> {
+    cells: [u32; 2],
+    vertices: &'a [super::TerrainVertex],
+}
+
+impl<'a> Emit<'a> {
+    fn new(detail: &'a TerrainDetail<'_>, place: u32, chunk: u32) -> Self {
+        let terrain = detail.terrain;
+        let of = &terrain.chunks[chunk as usize];
+        let is_odd = of.cells != [SIDE - 1; 2] || of.has_voids;
+        let odd = is_odd.then(|| OddChunk { cells: of.cells, vertices: &terrain.vertices[of.first_vertex as usize..] });
+        Self { indices: Vec::new(), base: place << VERTEX_BITS, odd }
+    }
+
+    fn triangle(&mut self, triangle: [u32; 3]) {
+        let Some(odd) = &self.odd else {
+            self.indices.extend_from_slice(&triangle.map(|vertex| self.base | vertex));
+            return;
+        };
+        let places = triangle.map(|vertex| {
+            let [i, j] = lattice::place(vertex);
+            [i.min(odd.cells[0]), j.min(odd.cells[1])]
+        });
+        let vertices = places.map(|[i, j]| j * (odd.cells[0] + 1) + i);
+        let [a, b, c] = places.map(|place| place.map(i64::from));
+        let has_area = (b[0] - a[0]) * (c[1] - a[1]) != (b[1] - a[1]) * (c[0] - a[0]);
+        if has_area && vertices.iter().all(|&vertex| !odd.vertices[vertex as usize].offset_m[0].is_nan()) {
+            self.indices.extend(vertices.map(|vertex| self.base | vertex));
+        }
+    }
 }

@@ -1,0 +1,344 @@
+//! What is drawn of a terrain: complete, without gaps, and where the full surface is.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::{HashMap, HashSet};
+
+use glam::DVec3;
+
+use super::{
+    query::intersect_triangle,
+    tests::{Random, forward, hill_heights, hills, nadir},
+    *,
+};
+use crate::pose::CameraPose;
+
+const TANGENTS: [f64; 4] = [-0.7, 0.9, -0.6, 0.5];
+const FOCAL_PX: f64 = 400.0;
+
+/// From above, along, from afar, and from among the hills.
+fn cameras() -> [CameraPose; 5] {
+    [
+        nadir(DVec3::new(100.0, 50.0, -900.0)),
+        nadir(DVec3::new(0.0, 0.0, -9000.0)),
+        forward(DVec3::new(-1300.0, 20.0, -200.0), 0.3),
+        forward(DVec3::new(-3000.0, -400.0, -500.0), 0.15),
+        forward(DVec3::new(0.0, 0.0, -20.0), 0.1),
+    ]
+}
+
+fn detail(terrain: &Terrain, camera: &CameraPose, max_error_px: f64) -> TerrainMesh {
+    TerrainDetail::new(terrain, camera, TANGENTS, FOCAL_PX, max_error_px).mesh()
+}
+
+/// Corners of the triangles as columns and rows of the full grid.
+fn triangles(terrain: &Terrain, mesh: &TerrainMesh) -> Vec<[[u32; 2]; 3]> {
+    let corner = |&index: &u32| {
+        let chunk = mesh.chunks[(index >> VERTEX_BITS) as usize];
+        let cells = terrain.chunks[chunk as usize].cells;
+        let vertex = index & ((1 << VERTEX_BITS) - 1);
+        assert!(vertex < (cells[0] + 1) * (cells[1] + 1));
+        let [x, y] = [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]].map(|n| n * CHUNK_CELLS);
+        [x + vertex % (cells[0] + 1), y + vertex / (cells[0] + 1)]
+    };
+    assert_eq!(mesh.indices.len() as u64, 3 * mesh.lod.triangles);
+    mesh.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]).collect()
+}
+
+fn vertex_m(terrain: &Terrain, [i, j]: [u32; 2]) -> DVec3 {
+    let (chunk, [a, b]) = terrain.chunk_of_cell([i.min(terrain.cells[0] - 1), j.min(terrain.cells[1] - 1)]);
+    terrain.position_ned_m(chunk, a + i - i.min(terrain.cells[0] - 1), b + j - j.min(terrain.cells[1] - 1))
+}
+
+/// The full surface at grid coordinates.
+fn full_m(terrain: &Terrain, at: [f64; 2]) -> DVec3 {
+    let [i, j] = [0, 1].map(|k: usize| (at[k].max(0.0) as u32).min(terrain.cells[k] - 1));
+    let (x, y) = (at[0] - f64::from(i), at[1] - f64::from(j));
+    let [nw, ne, sw, se] = [[i, j], [i + 1, j], [i, j + 1], [i + 1, j + 1]].map(|place| vertex_m(terrain, place));
+    if x > y { nw + x * (ne - nw) + y * (se - ne) } else { nw + y * (sw - nw) + x * (se - sw) }
+}
+
+/// Where a point is seen: x/z, y/z.
+fn seen(camera: &CameraPose, point: DVec3) -> Option<[f64; 2]> {
+    let p = camera.ned_from_camera.inverse() * (point - camera.position_ned_m);
+    let [u, v] = [p.x / p.z, p.y / p.z];
+    let is_in_sight = p.z > 1e-6 && (TANGENTS[0]..=TANGENTS[1]).contains(&u) && (TANGENTS[2]..=TANGENTS[3]).contains(&v);
+    is_in_sight.then_some([u, v])
+}
+
+/// Twice the area, in cells; positive as all triangles are turned.
+fn area2([a, b, c]: [[i64; 2]; 3]) -> i64 {
+    (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
+}
+
+/// Two places of each cell, in hundredths: how many triangles hold them within. On an edge, as may be where triangles are cut, it is none.
+fn covered(terrain: &Terrain, triangles: &[[[u32; 2]; 3]]) -> HashMap<[i64; 2], u32> {
+    let mut found: HashMap<[i64; 2], u32> = HashMap::new();
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|p| p.map(|n| 100 * i64::from(n)));
+        assert!(area2([a, b, c]) > 0, "{triangle:?}");
+        let range = |k: usize| {
+            let along = triangle.map(|p| i64::from(p[k]));
+            along[0].min(along[1]).min(along[2])..along[0].max(along[1]).max(along[2])
+        };
+        for j in range(1) {
+            for i in range(0) {
+                for place in [[31, 62], [62, 31]] {
+                    let p = [100 * i + place[0], 100 * j + place[1]];
+                    let least = area2([a, b, p]).min(area2([b, c, p])).min(area2([c, a, p]));
+                    if least >= 0 {
+                        *found.entry(p).or_default() += u32::from(least > 0);
+                    }
+                }
+            }
+        }
+    }
+    assert!(found.len() as u64 <= 2 * u64::from(terrain.cells[0]) * u64::from(terrain.cells[1]));
+    found
+}
+
+/// Triangles meet edge to edge, but where the terrain ends or out of sight; every place in sight is covered, and none twice.
+fn check_cover(terrain: &Terrain, camera: &CameraPose, mesh: &TerrainMesh) {
+    let triangles = triangles(terrain, mesh);
+    let edges: Vec<[[u32; 2]; 2]> = triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+    let known: HashSet<_> = edges.iter().collect();
+    assert_eq!(known.len(), edges.len(), "two triangles on the same side of an edge");
+    for &[a, b] in &edges {
+        let along_border = |k: usize| a[k] == b[k] && (a[k] == 0 || a[k] == terrain.cells[k]);
+        if known.contains(&[b, a]) || along_border(0) || along_border(1) {
+            continue;
+        }
+        let [from, to] = [a, b].map(|place| vertex_m(terrain, place));
+        let in_sight = (0..=16).any(|k| seen(camera, from.lerp(to, f64::from(k) / 16.0)).is_some());
+        assert!(!in_sight, "a gap at {a:?} {b:?}");
+    }
+    let covered = covered(terrain, &triangles);
+    assert!(covered.values().all(|&times| times <= 1));
+    for j in 0..terrain.cells[1] {
+        for i in 0..terrain.cells[0] {
+            for place in [[31, 62], [62, 31]] {
+                let p = [100 * i64::from(i) + place[0], 100 * i64::from(j) + place[1]];
+                let is_seen = seen(camera, full_m(terrain, p.map(|n| n as f64 / 100.0))).is_some();
+                assert!(!is_seen || covered.contains_key(&p), "{p:?} is in sight and not drawn");
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_in_sight_is_left_open() {
+    // Whole chunks, and ones that are smaller: to odd numbers, to a single row.
+    for (cols, rows) in [(193, 129), (150, 131), (102, 66)] {
+        let terrain = hills(cols, rows, 10.0, 40.0);
+        for camera in cameras() {
+            for max_error_px in [0.02, 0.25, 2.0, 30.0] {
+                check_cover(&terrain, &camera, &detail(&terrain, &camera, max_error_px));
+            }
+        }
+    }
+}
+
+#[test]
+fn nothing_is_left_open_from_anywhere() {
+    let terrain = hills(140, 140, 10.0, 25.0);
+    let mut random = Random(17);
+    let mut halved = 0;
+    for _ in 0..40 {
+        let position = DVec3::new(random.within(-900.0, 900.0), random.within(-900.0, 900.0), random.within(-1500.0, 40.0));
+        let camera = forward(position, random.within(-0.2, 1.5));
+        let mesh = detail(&terrain, &camera, 10f64.powf(random.within(-2.0, 1.5)));
+        halved += usize::from(mesh.lod.triangles > 100 && mesh.lod.triangles < 20_000);
+        check_cover(&terrain, &camera, &mesh);
+    }
+    assert!(halved > 10, "{halved} of 40 cases are in between");
+}
+
+#[test]
+fn the_selection_keeps_its_promise() {
+    let terrain = hills(330, 290, 10.0, 40.0);
+    let mut random = Random(5);
+    for camera in cameras() {
+        for max_error_px in [0.1, 0.25, 2.0] {
+            let mesh = detail(&terrain, &camera, max_error_px);
+            assert!(mesh.lod.max_error_px <= max_error_px, "{} > {max_error_px}", mesh.lod.max_error_px);
+            let mut worst = 0.0_f64;
+            for triangle in triangles(&terrain, &mesh) {
+                let corners = triangle.map(|place| vertex_m(&terrain, place));
+                for _ in 0..4 {
+                    let (a, b) = (random.next(), random.next());
+                    let [a, b] = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
+                    let weights = [1.0 - a - b, a, b];
+                    let drawn: DVec3 = (0..3).map(|k| weights[k] * corners[k]).sum();
+                    let at = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(triangle[k][axis])).sum());
+                    if let (Some(a), Some(b)) = (seen(&camera, full_m(&terrain, at)), seen(&camera, drawn)) {
+                        worst = worst.max(FOCAL_PX * (a[0] - b[0]).hypot(a[1] - b[1]));
+                    }
+                }
+            }
+            assert!(worst <= mesh.lod.max_error_px + 1e-6, "{worst} > {} px", mesh.lod.max_error_px);
+            // Not only a bound.
+            assert!(mesh.lod.triangles > 50_000 || worst > 0.3 * max_error_px, "{worst} of {max_error_px} px");
+        }
+    }
+    let fine = detail(&terrain, &cameras()[3], 0.25).lod.triangles;
+    let coarse = detail(&terrain, &cameras()[3], 2.0).lod.triangles;
+    assert!(coarse * 3 < fine, "{coarse} {fine}");
+}
+
+#[test]
+fn without_any_tolerance_it_is_the_full_surface() {
+    let terrain = hills(140, 100, 10.0, 40.0);
+    let camera = nadir(DVec3::new(0.0, 0.0, -2500.0));
+    let mesh = detail(&terrain, &camera, 0.0);
+    assert_eq!((mesh.lod.triangles, mesh.lod.max_error_px), (2 * 139 * 99, 0.0));
+    // Every diagonal runs from north-west to south-east.
+    let diagonals =
+        |t: &[[u32; 2]; 3]| (0..3).filter(|&k| t[k].map(|n| n + 1) == t[(k + 1) % 3] || t[(k + 1) % 3].map(|n| n + 1) == t[k]).count();
+    assert!(triangles(&terrain, &mesh).iter().all(|t| diagonals(t) == 1));
+}
+
+#[test]
+fn level_ground_needs_two_triangles_a_chunk() {
+    let terrain = Terrain::from_heights(200, 200, 10.0, &vec![0.0; 40_000], None).unwrap();
+    let camera = nadir(DVec3::new(0.0, 0.0, -5000.0));
+    let lod = detail(&terrain, &camera, 1e-9).lod;
+    // Not 0: barycentric weights of a plane's own points are rounded.
+    assert_eq!((lod.chunks, lod.triangles), (16, 32));
+    assert!(lod.max_error_px <= 1e-9);
+}
+
+#[test]
+fn one_cliff_does_not_refine_its_chunk() {
+    let mut heights = vec![0.0; 129 * 129];
+    heights[20 * 129 + 20] = 30.0;
+    let terrain = Terrain::from_heights(129, 129, 10.0, &heights, None).unwrap();
+    let mesh = detail(&terrain, &nadir(DVec3::new(0.0, 0.0, -2000.0)), 0.25);
+    assert!(mesh.lod.triangles < 120, "{}", mesh.lod.triangles);
+}
+
+#[test]
+fn errors_are_exact() {
+    // Odd sizes have triangles that were cut, whose sides cross the grid between vertices.
+    for (cols, rows) in [(65, 65), (65, 36), (23, 14)] {
+        let terrain = hills(cols, rows, 10.0, 30.0);
+        let cells = terrain.cells;
+        let grid = errors::ChunkGrid { cells, vertices: &terrain.vertices };
+        let found = errors::chunk_errors(&grid).keys;
+        let mut random = Random(3);
+        let (mut tight, mut asked) = (0, 0);
+        let mut level: Vec<[u32; 3]> = lattice::ROOTS.to_vec();
+        for _ in 0..7 {
+            for &triangle in &level {
+                let corners = triangle.map(lattice::place).map(|[i, j]| [i.min(cells[0]), j.min(cells[1])]);
+                if area2(corners.map(|p| p.map(i64::from))) == 0 {
+                    continue;
+                }
+                let points = corners.map(|place| vertex_m(&terrain, place));
+                let limit = found[lattice::halves(triangle).0 as usize];
+                let mut worst = 0.0_f64;
+                for _ in 0..100 {
+                    // Multiples of a fraction hit many corners of the overlay exactly.
+                    let weights = [random.next(), random.next(), random.next()].map(|w| (6.0 * w).round());
+                    let sum = weights.iter().sum::<f64>().max(1e-9);
+                    let at = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] / sum * f64::from(corners[k][axis])).sum::<f64>());
+                    let coarse: DVec3 = (0..3).map(|k| weights[k] / sum * points[k]).sum();
+                    if sum >= 1.0 {
+                        worst = worst.max((full_m(&terrain, at) - coarse).z.abs());
+                    }
+                }
+                assert!(errors::key_of_error(worst - 1e-9) <= limit, "{triangle:?} {worst} m");
+                asked += 1;
+                tight += usize::from(errors::key_of_error(1.4 * worst) >= limit);
+            }
+            level = level.into_iter().flat_map(|triangle| lattice::halves(triangle).1).collect();
+        }
+        // The limit is that of two triangles, and samples are few.
+        assert!(2 * tight > asked, "{tight} of {asked} are near their bound");
+    }
+}
+
+#[test]
+fn numbers_of_errors_order_as_errors_do() {
+    let mut last = 0;
+    for exponent in -200..200 {
+        let metres = 1.3f64.powi(exponent);
+        let (error, tolerance) = (errors::key_of_error(metres), errors::key_of_tolerance(metres));
+        // An error is within a tolerance only if it really is, and is so if it is below it by 2 %.
+        assert!(error > tolerance && error > last);
+        assert!(errors::key_of_error(0.98 * metres) <= tolerance, "{metres}");
+        last = error;
+    }
+    assert_eq!(errors::key_of_error(0.0), errors::key_of_tolerance(0.0));
+    assert_eq!([-1.0, f64::NAN].map(errors::key_of_tolerance), [0; 2]);
+    assert!(errors::key_of_error(f64::INFINITY) < detail::OUT_OF_SIGHT);
+    assert!(errors::key_of_tolerance(f64::INFINITY) < detail::OUT_OF_SIGHT && detail::OUT_OF_SIGHT < errors::VOID);
+}
+
+#[test]
+fn rays_meet_the_drawn_surface_where_its_triangles_are() {
+    let mut random = Random(5);
+    for (cols, rows) in [(129, 129), (90, 75)] {
+        let terrain = hills(cols, rows, 10.0, 30.0);
+        for max_error_px in [0.0, 0.3, 3.0] {
+            let detail = TerrainDetail::new(&terrain, &nadir(DVec3::new(0.0, 0.0, -3000.0)), TANGENTS, FOCAL_PX, max_error_px);
+            let drawn: Vec<[DVec3; 3]> =
+                triangles(&terrain, &detail.mesh()).into_iter().map(|t| t.map(|place| vertex_m(&terrain, place))).collect();
+            let (mut met, mut moved) = (0, 0.0_f64);
+            for _ in 0..200 {
+                let above = DVec3::new(random.within(-640.0, 640.0), random.within(-640.0, 640.0), -500.0);
+                // Straight down the two surfaces are met in one and the same cell.
+                let Some(hit) = terrain.intersect(above, DVec3::Z, f64::INFINITY) else { continue };
+                let exact = drawn.iter().filter_map(|&t| Some(intersect_triangle(t, above, DVec3::Z, f64::INFINITY)?.0));
+                let exact = exact.min_by(f64::total_cmp).unwrap();
+                let found = detail.drawn_t(&hit, above, DVec3::Z);
+                met += 1;
+                moved = moved.max((exact - hit.t).abs());
+                assert!((found - exact).abs() < 1e-6, "{max_error_px} px: {found} {exact} {}", hit.t);
+            }
+            assert!(met > 60, "{met}");
+            assert!((max_error_px == 0.0) == (moved < 1e-9), "{max_error_px} px moves by {moved}");
+        }
+    }
+}
+
+#[test]
+fn voids_lose_their_triangles_only() {
+    let mut heights = hill_heights(130, 130, 5.0);
+    heights[0] = f64::NAN; // north-west corner: the first cell loses both triangles
+    heights[130] = f64::INFINITY;
+    heights[64] = f64::NAN; // on the border of two chunks
+    let terrain = Terrain::from_heights(130, 130, 10.0, &heights, None).unwrap();
+    assert_eq!(terrain.chunks.iter().filter(|c| c.has_voids).count(), 2);
+    // Corners: (0,0) touches 1 cell, (0,1) 2 of which one was counted, (64,0) one in each chunk.
+    assert_eq!(terrain.void_cells, 4);
+    let all = 2 * 129 * 129;
+    let camera = nadir(DVec3::new(0.0, 0.0, -2000.0));
+    let full = detail(&terrain, &camera, 0.0);
+    // (0,0) and (0,1) take both triangles of cell (0,0); (0,1) is also the north-west of cell (0,1): both of its triangles.
+    // (64,0) is the north-east of cell (63,0), one triangle, and the north-west of cell (64,0), both.
+    assert_eq!(full.lod.triangles, all - 7);
+    let lost = |mesh: &TerrainMesh| {
+        let covered = covered(&terrain, &triangles(&terrain, mesh));
+        assert!(covered.values().all(|&times| times <= 1));
+        all as usize - covered.len()
+    };
+    assert_eq!(lost(&full), 7);
+    let north_west = terrain.intersect(DVec3::new(644.9, -644.9, -100.0), DVec3::Z, 200.0);
+    assert_eq!(north_west, None);
+    assert!(terrain.down_at(0.0, 0.0).is_some());
+    // With a wide tolerance the same is missing, and only the surroundings are complete.
+    let loose = detail(&terrain, &nadir(DVec3::new(0.0, 0.0, -8000.0)), 100.0);
+    assert_eq!(lost(&loose), 7);
+    assert!(loose.lod.triangles < 200, "{}", loose.lod.triangles);
+    let is_finite = |t: &[[u32; 2]; 3]| t.iter().all(|&place| vertex_m(&terrain, place).is_finite());
+    assert!(triangles(&terrain, &loose).iter().all(is_finite) && triangles(&terrain, &full).iter().all(is_finite));
+}
+
+#[test]
+fn where_everything_is_missing_nothing_is_drawn() {
+    let heights: Vec<f64> = (0..193 * 65).map(|k| if k % 193 < 70 { f64::NAN } else { 0.0 }).collect();
+    let terrain = Terrain::from_heights(193, 65, 10.0, &heights, None).unwrap();
+    assert_eq!(terrain.chunks.iter().map(|chunk| chunk.has_surface).collect::<Vec<_>>(), [false, true, true]);
+    let mesh = detail(&terrain, &nadir(DVec3::new(0.0, 0.0, -5000.0)), 1.0);
+    let drawn = covered(&terrain, &triangles(&terrain, &mesh)).len();
+    assert_eq!((mesh.chunks.clone(), drawn), (vec![1, 2], 2 * 122 * 64));
+}
