@@ -15,6 +15,10 @@ const GOLDEN: f32 = 0.6180339887;
 const LOOK_PX: f32 = 0.5;
 // Halvings of the distance in which a ray stops being free.
 const HALVINGS: u32 = 5u;
+// What a look of the search is for.
+const MARCHING: u32 = 0u;
+const HALVING: u32 = 1u;
+const ASKING: u32 = 2u;
 // A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
 const GAP_PX: f32 = 0.1;
 // A ray that ends this near to the plain gather's source has met the same, ideal pixels.
@@ -192,17 +196,14 @@ fn look_at(uv: vec2<f32>, pose: Pose, w: f32) -> Look {
     return Look(at_px, line_inverse_depth(uv, pose, fine_inverse_depth(at_px)));
 }
 
-// A ray that is free at two looks, the second deeper than what the first saw, may have met that in between: it has if the surface goes on
-// to where the ray is as deep.
-fn met_before(uv: vec2<f32>, pose: Pose, free: Look, px_per_w: f32) -> Met {
-    let there = look_at(uv, pose, free.found);
-    return Met(there.at_px, there.found, abs(free.found - there.found) * px_per_w < GAP_PX && inside_ideal(there.at_px));
-}
-
 // Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface within reach to infinity, lie on a line of
 // the ideal frame: as long as they are nearer than what the key shows at their places the ray is free. Where it is free no longer and
 // the depths to both sides are one, it meets a surface. Where they are not, it passes behind something; if it is still hidden when it
 // gets as deep as what was seen last, it has met what the key camera does not see, and what was seen last stands in.
+//
+// Written as one loop with one look, whatever the look is for: neighbouring rays are rarely at the same point of the search, and the code stays
+// small. MARCHING goes on by steps; HALVING finds where the ray stops being free; ASKING looks whether a ray that is free at two looks, the
+// second deeper than what the first saw, has met that in between: it has if the surface goes on to where the ray is as deep.
 fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
     let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
     let w_near = nearest_inverse_depth(uv, pose, reach_of(far_px));
@@ -214,55 +215,72 @@ fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
         return Met(there.at_px, there.found, true);
     }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);
-    var free = look_at(uv, pose, w_near);
-    var free_w = w_near;
+    var goal = MARCHING;
+    var taken = 0u;
+    var halvings = 0u;
     var hidden = false;
-    for (var i = 1u; i <= looks; i++) {
-        let w = w_near * (1.0 - f32(i) / f32(looks));
+    var w = w_near;
+    var free = Look(near_px, 0.0);
+    var free_w = w;
+    var behind_w = w;
+    var behind_found = 0.0;
+    // What to go on with if the question is denied.
+    var next = free;
+    var next_w = w;
+    loop {
         let here = look_at(uv, pose, w);
-        if (w > here.found) {
-            if (w <= free.found) {
+        if (goal == ASKING) {
+            if (abs(free.found - here.found) * px_per_w < GAP_PX && inside_ideal(here.at_px)) {
+                return Met(here.at_px, here.found, true);
+            }
+            free = next;
+            free_w = next_w;
+            goal = select(MARCHING, HALVING, halvings > 0u);
+        } else if (w > here.found || taken == 0u) {
+            if (taken > 0u && w <= free.found) {
                 if (hidden) {
                     break;
                 }
-                let met = met_before(uv, pose, free, px_per_w);
-                if (met.seen) {
-                    return met;
-                }
+                next = here;
+                next_w = w;
+                w = free.found;
+                goal = ASKING;
+                continue;
             }
             free = here;
             free_w = w;
             hidden = false;
-            continue;
-        }
-        if (!hidden) {
-            var behind = here;
-            var behind_w = w;
-            for (var k = 0u; k < HALVINGS; k++) {
-                let between_w = 0.5 * (free_w + behind_w);
-                let between = look_at(uv, pose, between_w);
-                if (between_w > between.found) {
-                    if (between_w <= free.found) {
-                        let met = met_before(uv, pose, free, px_per_w);
-                        if (met.seen) {
-                            return met;
-                        }
-                    }
-                    free = between;
-                    free_w = between_w;
-                } else {
-                    behind = between;
-                    behind_w = between_w;
-                }
+        } else {
+            behind_w = w;
+            behind_found = here.found;
+            if (goal == MARCHING && !hidden) {
+                goal = HALVING;
+                halvings = HALVINGS + 1u;
+            } else if (goal == MARCHING && w <= free.found) {
+                break;
             }
-            if ((behind.found - free.found) * px_per_w < GAP_PX) {
+        }
+        if (goal == HALVING) {
+            halvings--;
+            if (halvings > 0u) {
+                w = 0.5 * (free_w + behind_w);
+                continue;
+            }
+            if ((behind_found - free.found) * px_per_w < GAP_PX) {
                 return Met(free.at_px, free.found, inside_ideal(free.at_px));
             }
             hidden = true;
+            goal = MARCHING;
+            if (w_near * (1.0 - f32(taken) / f32(looks)) <= free.found) {
+                break;
+            }
         }
-        if (w <= free.found) {
+        taken++;
+        if (taken > looks) {
             break;
         }
+        // 0 at the last.
+        w = w_near * (1.0 - f32(taken) / f32(looks));
     }
     return Met(free.at_px, free.found, false);
 }
