@@ -75,22 +75,13 @@ impl FramePlan {
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
-        let rays = match self.edges {
-            EdgeStage::None => {
-                let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-                passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed)"));
-                String::new()
-            }
-            EdgeStage::Supersampled { scale, samples } => {
-                passes.push(format!(
-                    "ideal: {frames}{}x{} px rgba16float + depth32float (reversed), 4 samples each",
-                    width * scale,
-                    height * scale
-                ));
-                passes.push(format!("resolve: {width}x{height} px of colour and depth, silhouettes marked"));
-                format!(", {samples} rays a pixel at silhouettes")
-            }
-        };
+        let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
+        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed)"));
+        if let EdgeStage::Supersampled { scale, .. } = self.edges {
+            let color = if scale > 1 { "rgba16float + " } else { "" };
+            passes.push(format!("ideal_fine: {frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale));
+            passes.push(format!("resolve: {width}x{height} px of depth, silhouettes marked"));
+        }
         let ray = match self.ray {
             RayStage::Pinhole => "pinhole ray",
             RayStage::LensMap => "lens map",
@@ -117,7 +108,10 @@ impl FramePlan {
             TapStage::Grid { most } => format!("spline, or up to {most}x{most} taps a pixel"),
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
-        passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}){rays} -> photometric{truth}"));
+        passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}) -> photometric{truth}"));
+        if let EdgeStage::Supersampled { samples, .. } = self.edges {
+            passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
+        }
         passes.push("readback".to_owned());
         passes
     }
