@@ -3,6 +3,8 @@
 //!
 //! `cargo bench --bench host`
 
+#![allow(clippy::print_stdout, reason = "the numbers of triangles belong to their times")]
+
 use std::{
     convert::Infallible,
     hint::black_box,

@@ -223,7 +223,7 @@ fn what_lies_beyond_the_view_costs_nothing() {
         (0..side * side).map(|k| 20.0 * ((0.3 * at(k % side)).sin() + (0.23 * at(k / side) + 0.1 * at(k % side)).cos())).collect()
     };
     let camera = nadir(DVec3::new(0.0, 0.0, -1300.0));
-    let [small, large] = [257, 1025].map(|side| {
+    let [small, large] = [257, 641].map(|side| {
         let terrain = Terrain::from_heights(side, side, 10.0, &heights(side), None).unwrap();
         detail(&terrain, &camera, 0.25).lod
     });
