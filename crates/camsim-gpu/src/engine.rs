@@ -377,7 +377,7 @@ impl Session<'_> {
             on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
         }
         self.engine.check()?;
-        let lod = self.drawn.as_ref().map(|drawn| drawn.lod.clone()).unwrap_or_default();
+        let lod = self.drawn.as_ref().map(|drawn| drawn.lod).unwrap_or_default();
         let times = FrameTimes { record_ms: ms_since(begun), ..FrameTimes::default() };
         Ok(InFlight { slot, plan, submission, lod, times })
     }

@@ -216,6 +216,23 @@ fn one_cliff_does_not_refine_its_chunk() {
 }
 
 #[test]
+fn what_lies_beyond_the_view_costs_nothing() {
+    // The same hills in a wider terrain: whole chunks more on each side.
+    let heights = |side: u32| -> Vec<f64> {
+        let at = |index: u32| f64::from(index) - f64::from(side / 2);
+        (0..side * side).map(|k| 20.0 * ((0.3 * at(k % side)).sin() + (0.23 * at(k / side) + 0.1 * at(k % side)).cos())).collect()
+    };
+    let camera = nadir(DVec3::new(0.0, 0.0, -1300.0));
+    let [small, large] = [257, 641].map(|side| {
+        let terrain = Terrain::from_heights(side, side, 10.0, &heights(side), None).unwrap();
+        detail(&terrain, &camera, 0.25).lod
+    });
+    assert!(small.triangles > 10_000 && small.chunks == large.chunks);
+    // At its end the smaller one does without halves that its continuation would ask for.
+    assert!(large.triangles.abs_diff(small.triangles) < small.triangles / 100, "{} {}", small.triangles, large.triangles);
+}
+
+#[test]
 fn errors_are_exact() {
     // Odd sizes have triangles that were cut, whose sides cross the grid between vertices.
     for (cols, rows) in [(65, 65), (65, 36), (23, 14)] {

@@ -123,21 +123,27 @@ fn triangle_error(grid: &ChunkGrid<'_>, corners: [[i32; 2]; 3]) -> Worst {
         return worst;
     }
     let points = corners.map(|p| grid.at(p[0], p[1]));
-    let axis = |k: usize| {
-        let values = corners.map(|p| p[k]);
-        (values[0].min(values[1]).min(values[2]), values[0].max(values[1]).max(values[2]))
-    };
-    let ((i0, i1), (j0, j1)) = (axis(0), axis(1));
+    let [rows, columns] = [1, 0].map(|k: usize| {
+        let along = corners.map(|p| p[k]);
+        along[0].min(along[1]).min(along[2])..=along[0].max(along[1]).max(along[2])
+    });
+    // The plane, from its corner 0: what a step along a row or column adds.
+    let (to_1, to_2) = (points[1] - points[0], points[2] - points[0]);
+    let [[i1, j1], [i2, j2]] = [1, 2].map(|k: usize| [0, 1].map(|axis: usize| f64::from(corners[k][axis] - corners[0][axis])));
     let scale = 1.0 / f64::from(area2);
-    for j in j0..=j1 {
-        for i in i0..=i1 {
-            // All of area2's sign inside the triangle.
-            let w0 = cross(corners[1], corners[2], [i, j]);
-            let w1 = cross(corners[2], corners[0], [i, j]);
-            let w2 = area2 - w0 - w1;
-            if w0 <= 0 && w1 <= 0 && w2 <= 0 {
-                let [w0, w1, w2] = [w0, w1, w2].map(|w| f64::from(w) * scale);
-                worst.add(grid.at(i, j) - (points[0] * w0 + points[1] * w1 + points[2] * w2));
+    let [per_column, per_row] = [(to_1 * j2 - to_2 * j1) * scale, (to_2 * i1 - to_1 * i2) * scale];
+    for j in rows {
+        let start = points[0] + f64::from(j - corners[0][1]) * per_row;
+        // All of area2's sign, which is negative, inside the triangle; along a row they change by the same number from column to column.
+        let outside = |i: i32| [0, 1, 2].map(|k: usize| cross(corners[k], corners[(k + 1) % 3], [i, j]));
+        let mut sides = outside(*columns.start());
+        let steps: [i32; 3] = std::array::from_fn(|k| corners[k][1] - corners[(k + 1) % 3][1]);
+        for i in columns.clone() {
+            if sides.iter().all(|&side| side <= 0) {
+                worst.add(grid.at(i, j) - (start + f64::from(i - corners[0][0]) * per_column));
+            }
+            for (side, step) in sides.iter_mut().zip(steps) {
+                *side += step;
             }
         }
     }
