@@ -1,7 +1,7 @@
 //! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
+    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
     scene::{LodSelection, Scene, select_lod},
@@ -13,7 +13,7 @@ use crate::{
     context::GpuContext,
     layout::{ChunkDraw, IdealCamera},
     recorder::Recorder,
-    shaders::{self, ComposeError},
+    shaders::{self, ComposeError, Slot},
     upload::SceneBuffers,
 };
 
@@ -86,6 +86,16 @@ impl IdealTarget {
     }
 }
 
+/// What fills the surfaces' slot.
+pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
+    let file = match reads {
+        SurfaceReads::Two => "ideal/reads/two.wgsl",
+        SurfaceReads::Four => "ideal/reads/four.wgsl",
+        SurfaceReads::Grid => "ideal/reads/grid.wgsl",
+    };
+    ("reads", file)
+}
+
 /// Format that surfaces are drawn to with one sample a pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
@@ -107,8 +117,9 @@ pub struct IdealPass {
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
-    plain: SurfacePipelines,
-    fine: SurfacePipelines,
+    /// By [`SurfaceReads`].
+    plain: [SurfacePipelines; 3],
+    fine: [SurfacePipelines; 3],
 }
 
 /// What draws surfaces to a target of a given number of samples.
@@ -154,11 +165,17 @@ impl IdealPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
         };
-        let pipelines = |samples, format| -> Result<_, ComposeError> {
+        let with_reads = |reads, samples, format| -> Result<_, ComposeError> {
+            let slot = reads_slot(reads);
+            let mesh_buffers = &[Some(mesh_vertices.clone())];
             Ok(SurfacePipelines {
-                terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples, format)?,
-                mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples, format)?,
+                terrain: pipeline(gpu, "ideal/terrain.wgsl", slot, &[&camera_layout, &terrain_layout], &[], samples, format)?,
+                mesh: pipeline(gpu, "ideal/mesh.wgsl", slot, &[&camera_layout, &mesh_layout], mesh_buffers, samples, format)?,
             })
+        };
+        let pipelines = |samples, format| -> Result<_, ComposeError> {
+            let [two, four, grid] = SurfaceReads::ALL.map(|reads| with_reads(reads, samples, format));
+            Ok([two?, four?, grid?])
         };
         let (plain, fine) = (pipelines(1, color_format(preset))?, pipelines(FINE_SAMPLES, COLOR_FORMAT)?);
         Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
@@ -225,8 +242,10 @@ impl IdealPass {
     ) -> LodSelection {
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (color_view, depth_view, resolved_view, scale, pipelines) = match &target.fine {
-            None => (view(&target.color), view(&target.depth), None, 1, &self.plain),
-            Some(fine) => (view(&fine.color), fine.depth_view(), Some(view(&fine.averaged)), fine.scale, &self.fine),
+            None => (view(&target.color), view(&target.depth), None, 1, &self.plain[plan.surface_reads as usize]),
+            Some(fine) => {
+                (view(&fine.color), fine.depth_view(), Some(view(&fine.averaged)), fine.scale, &self.fine[plan.surface_reads as usize])
+            }
         };
         let [r, g, b] = scene.sky_linear.map(f64::from);
         let mut pass = recorder.render_pass(
@@ -391,12 +410,13 @@ fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
 fn pipeline(
     gpu: &GpuContext,
     file: &str,
+    slot: Slot,
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
     format: wgpu::TextureFormat,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
-    let module = shaders::module(&gpu.device, file, file, &[])?;
+    let module = shaders::module(&gpu.device, file, file, &[slot])?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(file),
