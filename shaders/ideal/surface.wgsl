@@ -41,65 +41,69 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
     return out;
 }
 
+// What reads the picture: the `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
+// filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter.
 @group(1) @binding(0) var surface_texture: texture_2d<f32>;
 @group(1) @binding(1) var surface_sampler: sampler;
 
-// Most taps along the longer axis of a pixel's footprint.
-const MAX_TAPS: f32 = 32.0;
-// Taps along the shorter axis of a footprint that is wider than half a texel: a single tap of a smaller version blurs over twice the pixel,
-// and one of the picture itself not at all.
-const SHORT_TAPS: f32 = 2.0;
-const ONE_TAP: f32 = 0.5;
-
-// Variance (times 12) that a version of 2^level texels adds to what the picture has between its texels: of the mean of so many, and of the
-// wider ramps.
-fn version_variance(level: f32) -> f32 {
-    let below = floor(level);
-    return 3.0 * (mix(exp2(2.0 * below), exp2(2.0 * below + 2.0), level - below) - 1.0);
+// The ellipse that stands for a pixel on the picture, texels.
+struct Pixel {
+    size: vec2<f32>,
+    // Its axes.
+    longer: f32,
+    shorter: f32,
+    // Direction of the longer one.
+    along: vec2<f32>,
 }
 
-// Length along which `taps` taps and the version that they read have the variance of a mean over `side`.
-fn tap_length(side: f32, taps: f32, version: f32) -> f32 {
-    return sqrt(max(side * side - version, 0.0) / max(1.0 - 1.0 / (taps * taps), 0.5));
-}
-
-// Mean of the picture over a pixel: the ellipse that stands for the pixel on the picture is covered by a grid of trilinear taps, as many
-// along its longer axis as keep them square. Own code, because adapters' anisotropic filters are each their own approximation.
-fn picture_at(uv: vec2<f32>) -> vec3<f32> {
+fn pixel_at(uv: vec2<f32>) -> Pixel {
     let size = vec2<f32>(textureDimensions(surface_texture));
     let dx = dpdx(uv) * size;
     let dy = dpdy(uv) * size;
-    // The ellipse's axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b, c]].
+    // The axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b, c]].
     let a = dx.x * dx.x + dy.x * dy.x;
     let b = dx.x * dx.y + dy.x * dy.y;
     let c = dx.y * dx.y + dy.y * dy.y;
     let mean = 0.5 * (a + c);
     let spread = sqrt(0.25 * (a - c) * (a - c) + b * b);
-    let longer = sqrt(mean + spread);
-    let shorter = sqrt(max(mean - spread, 0.0));
-    // What a tap covers, texels; a direction in which a texel is two pixels wide needs no more than one tap.
-    let short_taps = select(1.0, SHORT_TAPS, shorter > ONE_TAP);
-    let covered = max(shorter / short_taps, 1.0);
-    let long_taps = clamp(ceil(longer / covered - 0.1), short_taps, MAX_TAPS);
-    let level = log2(max(longer / long_taps, covered));
     // Of the two expressions of the eigenvector, the one without cancellation.
     let along_x = vec2<f32>(0.5 * (a - c) + spread, b);
     let along_y = vec2<f32>(b, 0.5 * (c - a) + spread);
     let both = select(along_y, along_x, a >= c);
     // A circle has no longer axis: any will do.
     let along = select(vec2<f32>(1.0, 0.0), both / max(length(both), 1e-20), spread > 1e-6 * mean);
-    let version = version_variance(level);
-    let long_axis = along * tap_length(longer, long_taps, version) / size;
-    let short_axis = vec2<f32>(-along.y, along.x) * tap_length(shorter, short_taps, version) / size;
-    var sum = vec3<f32>(0.0);
-    for (var j = 0.0; j < short_taps; j += 1.0) {
-        for (var i = 0.0; i < long_taps; i += 1.0) {
-            let at = uv + ((i + 0.5) / long_taps - 0.5) * long_axis + ((j + 0.5) / short_taps - 0.5) * short_axis;
-            sum += textureSampleLevel(surface_texture, surface_sampler, at, level).rgb;
-        }
-    }
-    return sum / (long_taps * short_taps);
+    return Pixel(size, sqrt(mean + spread), sqrt(max(mean - spread, 0.0)), along);
 }
+
+fn picture_read(uv: vec2<f32>, level: f32) -> vec3<f32> {
+    return textureSampleLevel(surface_texture, surface_sampler, uv, level).rgb;
+}
+
+// What a read is of.
+struct Version {
+    // Its variance (times 12) beyond what the picture has between its texels, texels^2.
+    variance: f32,
+    level: f32,
+}
+
+// Reads this far apart, texels, or less need no smaller version of the picture.
+const CLOSE_TEXELS: f32 = 0.8;
+// Variance (times 12) of the version for reads a texel apart: more than the 1 of their cell, because what a read lets through between the
+// cells comes back as another wave.
+const CELL_VARIANCE: f32 = 1.5;
+
+// For reads `cell` texels apart. A version of 2^level texels has the variance 3 (4^level - 1), one between two whole levels a mixture.
+fn version_for(cell: f32) -> Version {
+    let close = cell <= CLOSE_TEXELS;
+    let variance = select(CELL_VARIANCE * cell * cell, 0.0, close);
+    let texels2 = variance / 3.0 + 1.0;
+    let below = floor(0.5 * log2(texels2));
+    let level = below + (texels2 * exp2(-2.0 * below) - 1.0) / 3.0;
+    // Exactly 0 needs one version instead of two.
+    return Version(variance, select(level, 0.0, close));
+}
+
+#import <slot:reads>
 
 @fragment
 fn fragment(in: Surface) -> @location(0) vec4<f32> {

@@ -109,6 +109,23 @@ pub enum TemporalStage {
     Rk2,
 }
 
+/// How a pixel of the ideal frame reads the picture of the surface that it shows. The order is that of cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceReads {
+    /// Two reads along the pixel's longer axis.
+    Two,
+    /// Four: two by two, or in a row where the pixel is long.
+    Four,
+    /// One or two across, and up to 32 along.
+    Grid,
+}
+
+impl SurfaceReads {
+    /// All of them, each at its own number.
+    pub const ALL: [Self; 3] = [Self::Two, Self::Four, Self::Grid];
+}
+
 /// Motion blur.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlurStage {
@@ -187,6 +204,8 @@ pub struct FramePlan {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
+    /// What reads the surfaces' pictures for the ideal frame.
+    pub surface_reads: SurfaceReads,
     /// What reads the ideal frame for each sample.
     pub taps: TapStage,
     /// Fog after the gather (the paper's); otherwise it is in the ideal frame.
@@ -344,7 +363,7 @@ impl Planner {
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
             (blur, edges)
         };
-        let expected = prospect.expected(sampling.scale, sampling.taps, blur);
+        let expected = prospect.expected(&sampling, blur);
         let case = error::Case {
             reach: &reach,
             sequence: &self.sequence,
@@ -398,6 +417,7 @@ impl Planner {
             temporal,
             blur,
             edges,
+            surface_reads: sampling.surface_reads,
             taps: sampling.taps,
             linear_fog: if is_paper { paper::fog(scene) } else { None },
             truth: self.truth,

@@ -362,7 +362,7 @@ impl Session<'_> {
         if plan.ray == RayStage::LensMap {
             self.lens_inverse(&mut recorder, &plan);
         }
-        self.ideal(&mut recorder, &plan, slot);
+        self.ideal(&mut recorder, &plan, slot)?;
         self.reverse(&mut recorder, &plan, slot)?;
         let slot_buffers = &mut self.slots[slot];
         slot_buffers.color.copy(recorder.encoder());
@@ -410,7 +410,7 @@ impl Session<'_> {
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    fn ideal(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) {
+    fn ideal(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
             drawn.poses == poses
@@ -418,7 +418,7 @@ impl Session<'_> {
                 && drawn.edges == plan.edges
                 && drawn.terrain_error_px == plan.terrain_error_px
         }) {
-            return;
+            return Ok(());
         }
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
@@ -448,8 +448,9 @@ impl Session<'_> {
             plan,
             plan.terrain_error_px,
             &self.targets[target],
-        );
+        )?;
         self.drawn = Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
+        Ok(())
     }
 
     /// Pass 3: the output frame.

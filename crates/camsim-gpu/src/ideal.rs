@@ -1,7 +1,9 @@
 //! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
 
+use std::collections::HashMap;
+
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
+    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
     scene::{LodSelection, Scene, Terrain, TerrainDetail, TerrainMesh},
@@ -13,7 +15,7 @@ use crate::{
     context::GpuContext,
     layout::{ChunkPlace, IdealCamera},
     recorder::Recorder,
-    shaders::{self, ComposeError},
+    shaders::{self, ComposeError, Slot},
     upload::SceneBuffers,
 };
 
@@ -89,6 +91,16 @@ impl IdealTarget {
     }
 }
 
+/// What fills the surfaces' slot.
+pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
+    let file = match reads {
+        SurfaceReads::Two => "ideal/reads/two.wgsl",
+        SurfaceReads::Four => "ideal/reads/four.wgsl",
+        SurfaceReads::Grid => "ideal/reads/grid.wgsl",
+    };
+    ("reads", file)
+}
+
 /// Format that surfaces are drawn to with one sample a pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
@@ -110,9 +122,20 @@ pub struct IdealPass {
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
-    plain: SurfacePipelines,
-    /// For supersampled frames: depth alone, and with colour.
-    fine: [SurfacePipelines; 2],
+    /// Compiled when first needed.
+    pipelines: HashMap<SurfaceKey, SurfacePipelines>,
+    color_format: wgpu::TextureFormat,
+}
+
+/// Which pipelines draw surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum SurfaceKey {
+    /// Colour and depth, one sample a pixel.
+    Plain(SurfaceReads),
+    /// Depth, several samples a pixel.
+    FineDepth,
+    /// Colour and depth, several samples a pixel.
+    Fine(SurfaceReads),
 }
 
 /// What draws surfaces to a target of a given number of samples.
@@ -155,20 +178,34 @@ impl IdealPass {
         );
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
+        Ok(Self {
+            resolve: ResolvePass::new(gpu)?,
+            camera_layout,
+            terrain_layout,
+            mesh_layout,
+            pipelines: HashMap::new(),
+            color_format: color_format(preset),
+        })
+    }
+
+    fn surface_pipelines(&self, gpu: &GpuContext, key: SurfaceKey) -> Result<SurfacePipelines, ComposeError> {
         let mesh_vertices = wgpu::VertexBufferLayout {
             array_stride: 20,
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
         };
-        let pipelines = |samples, format: Option<wgpu::TextureFormat>| -> Result<_, ComposeError> {
-            Ok(SurfacePipelines {
-                terrain: pipeline(gpu, "ideal/terrain.wgsl", &[&camera_layout, &terrain_layout], &[], samples, format)?,
-                mesh: pipeline(gpu, "ideal/mesh.wgsl", &[&camera_layout, &mesh_layout], &[Some(mesh_vertices.clone())], samples, format)?,
-            })
+        let (reads, samples, format) = match key {
+            SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
+            // Nothing is read for depth.
+            SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
+            SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
-        let (plain, fine) =
-            (pipelines(1, Some(color_format(preset)))?, [pipelines(FINE_SAMPLES, None)?, pipelines(FINE_SAMPLES, Some(COLOR_FORMAT))?]);
-        Ok(Self { resolve: ResolvePass::new(gpu)?, camera_layout, terrain_layout, mesh_layout, plain, fine })
+        let slot = reads_slot(reads);
+        let (terrain, mesh) = ([&self.camera_layout, &self.terrain_layout], [&self.camera_layout, &self.mesh_layout]);
+        Ok(SurfacePipelines {
+            terrain: pipeline(gpu, "ideal/terrain.wgsl", slot, &terrain, &[], samples, format)?,
+            mesh: pipeline(gpu, "ideal/mesh.wgsl", slot, &mesh, &[Some(mesh_vertices)], samples, format)?,
+        })
     }
 
     /// Buffers for one ideal frame of this scene.
@@ -220,8 +257,11 @@ impl IdealPass {
     }
 
     /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
+    ///
+    /// # Errors
+    /// Faults of the shader files.
     pub fn encode(
-        &self,
+        &mut self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
         slots: &mut [IdealSlot],
@@ -230,7 +270,15 @@ impl IdealPass {
         plan: &FramePlan,
         max_terrain_error_px: f64,
         target: &IdealTarget,
-    ) -> LodSelection {
+    ) -> Result<LodSelection, ComposeError> {
+        let plain = SurfaceKey::Plain(plan.surface_reads);
+        let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
+        let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
+        for key in [Some(plain), fine].into_iter().flatten() {
+            if !self.pipelines.contains_key(&key) {
+                self.pipelines.insert(key, self.surface_pipelines(gpu, key)?);
+            }
+        }
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
         let (color_view, depth_view) = (view(color), view(depth));
@@ -254,31 +302,32 @@ impl IdealPass {
             }
         }
         let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), depth_attachment(&depth_view));
-        self.draw_keys(&mut pass, &self.plain, plan, 1, buffers, slots, &index_counts);
+        self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, &index_counts);
         drop(pass);
-        if let Some(fine) = &target.fine {
+        if let (Some(fine), Some(key)) = (&target.fine, fine) {
             let depth_view = fine.depth_view();
             let color_view = fine.color.as_ref().map(view);
             let color = color_view.as_ref().map(|view| color_attachment(view, scene));
             let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&depth_view));
-            self.draw_keys(&mut pass, &self.fine[usize::from(fine.color.is_some())], plan, fine.scale, buffers, slots, &index_counts);
+            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, &index_counts);
             drop(pass);
             self.resolve.encode(gpu, recorder, plan, target, fine);
         }
-        middle_lod
+        Ok(middle_lod)
     }
 
     /// Draws each key's surfaces, one key below the other.
     fn draw_keys(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        pipelines: &SurfacePipelines,
+        key: SurfaceKey,
         plan: &FramePlan,
         scale: u32,
         buffers: &SceneBuffers,
         slots: &[IdealSlot],
         index_counts: &[u32],
     ) {
+        let Some(pipelines) = self.pipelines.get(&key) else { return };
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
         for ((slot, &indices), k) in slots.iter().zip(index_counts).zip(0..) {
             let first_row = key_rows(&plan.ideal) * k * scale;
@@ -413,12 +462,13 @@ fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
 fn pipeline(
     gpu: &GpuContext,
     file: &str,
+    slot: Slot,
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
     color: Option<wgpu::TextureFormat>,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
-    let module = shaders::module(&gpu.device, file, file, &[])?;
+    let module = shaders::module(&gpu.device, file, file, &[slot])?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(file),

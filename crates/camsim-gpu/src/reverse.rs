@@ -516,6 +516,8 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
 mod tests {
     #![allow(clippy::unwrap_used)]
 
+    use camsim_core::plan::SurfaceReads;
+
     use super::*;
 
     #[test]
@@ -524,9 +526,12 @@ mod tests {
             let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, RAYS_SHADER] };
             files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
-        let ideal = ["ideal/terrain.wgsl", "ideal/mesh.wgsl", "ideal/resolve.wgsl", "ideal/reach.wgsl"]
-            .map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
-        for (name, text) in texts.chain(ideal) {
+        let surfaces = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].into_iter().flat_map(|file| {
+            SurfaceReads::ALL
+                .map(|reads| (format!("{file} {reads:?}"), shaders::compose(file, &[crate::ideal::reads_slot(reads)]).unwrap()))
+        });
+        let resolve = ["ideal/resolve.wgsl", "ideal/reach.wgsl"].map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
+        for (name, text) in texts.chain(surfaces).chain(resolve) {
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));

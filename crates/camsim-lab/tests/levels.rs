@@ -64,8 +64,8 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             let ratio = measured_dn / predicted_dn;
             let scale = plan.ideal.focal_px.x / plan.camera.focal_px.x;
             eprintln!(
-                "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?}",
-                case.name, predicted.resampling_dn, predicted.blur_dn, plan.taps
+                "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
+                case.name, predicted.resampling_dn, predicted.blur_dn, plan.surface_reads, plan.taps
             );
             assert_eq!(predicted.levels_kept, predicted_dn <= max_error_dn, "{}", case.name);
             assert_eq!(predicted.levels_kept, predicted.levels_in_the_way.is_none());

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, FramePlan, Motion, Predicted, RayStage, Skip, TemporalStage};
+use super::{BlurStage, EdgeStage, FramePlan, Motion, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
 use crate::{
     scenario::Preset,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
@@ -45,6 +45,8 @@ pub struct PlanSummary<'a> {
     pub blur: Option<BlurStage>,
     /// Pixels that see a silhouette.
     pub edges: EdgeStage,
+    /// What reads the surfaces' pictures for the ideal frame.
+    pub surface_reads: SurfaceReads,
     /// What reads the ideal frame for each sample.
     pub taps: TapStage,
     /// Ideal pixels for each of the camera's.
@@ -71,12 +73,17 @@ impl FramePlan {
                 format!("{count} frames, {spacing_ms:.1} ms apart, of ")
             }
         };
+        let reads = match self.surface_reads {
+            SurfaceReads::Two => "2 texture reads a pixel",
+            SurfaceReads::Four => "4 texture reads a pixel",
+            SurfaceReads::Grid => "up to 2x32 texture reads a pixel",
+        };
         let mut passes = Vec::new();
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed)"));
+        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}"));
         if let EdgeStage::Supersampled { scale, .. } = self.edges {
             let color = if scale > 1 { "rgba16float + " } else { "" };
             passes.push(format!("ideal_fine: {frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale));
@@ -136,6 +143,7 @@ impl FramePlan {
             temporal: self.temporal,
             blur: self.blur,
             edges: self.edges,
+            surface_reads: self.surface_reads,
             taps: self.taps,
             ideal_scale: self.ideal.focal_px.x / self.camera.focal_px.x,
             motion: self.motion,

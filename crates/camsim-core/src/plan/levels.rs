@@ -11,7 +11,7 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, LensReach,
+    BlurStage, LensReach, SurfaceReads,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
     surfaces::{Met, Surfaces},
@@ -44,8 +44,9 @@ const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
-/// Costs beside one bilinear read of an output pixel: an ideal pixel, and a read of the spline. Rough, from frame times on llvmpipe.
-const IDEAL_COST: f64 = 20.0;
+/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], and a read of the spline. Rough, from frame times on
+/// llvmpipe; of an ideal pixel what is done for it beside the reads counts too (depth, silhouettes), so that reads are spent before pixels.
+const IDEAL_COSTS: [f64; 3] = [16.5, 17.5, 20.0];
 const SPLINE_COST: f64 = 6.0;
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
 const FOG_AT_VISIBILITY: f64 = 3.912;
@@ -68,6 +69,7 @@ impl Expected {
 pub(super) struct Sampling {
     /// Ideal pixels for each of the camera's.
     pub scale: f64,
+    pub surface_reads: SurfaceReads,
     pub taps: TapStage,
     pub samples_per_px: f64,
     pub expected: Expected,
@@ -162,22 +164,23 @@ impl<'a> Prospect<'a> {
     }
 
     /// What is to be expected of a way of sampling.
-    pub fn expected(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
-        self.expected_at(1, scale, taps, blur)
+    pub fn expected(&self, sampling: &Sampling, blur: Option<BlurStage>) -> Expected {
+        self.expected_at(1, sampling, blur)
     }
 
     /// The same from one place of `every`.
-    fn expected_at(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> Expected {
-        let [exact, sampled] = self.squares(every, scale, taps, blur);
+    fn expected_at(&self, every: usize, sampling: &Sampling, blur: Option<BlurStage>) -> Expected {
+        let [exact, sampled] = self.squares(every, sampling, blur);
         Expected { resampling_dn: dn(exact), blur_dn: SAFETY * 255.0 * (sampled - exact).max(0.0).sqrt() }
     }
 
     /// Mean squared errors with the exposure exact, and with its samples.
-    fn squares(&self, every: usize, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> [f64; 2] {
+    fn squares(&self, every: usize, sampling: &Sampling, blur: Option<BlurStage>) -> [f64; 2] {
+        let &Sampling { scale, surface_reads, taps, .. } = sampling;
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip());
+            let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip(), surface_reads);
             let samples = blur.map(|BlurStage { nodes, samples_per_px, max_samples, .. }| {
                 let segments = nodes - 1;
                 let at_least = (area.taps[0] * area.taps[1]).div_ceil(segments);
@@ -201,10 +204,11 @@ impl<'a> Prospect<'a> {
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && fits(scale));
         let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
-        let mut ways: Vec<(f64, f64, TapStage)> = scales
+        let mut ways: Vec<(f64, Sampling)> = scales
             .iter()
             .flat_map(|&scale| self.stages(quality, scale).into_iter().map(move |taps| (scale, taps)))
-            .map(|(scale, taps)| (self.cost(scale, taps, nodes), scale, taps))
+            .flat_map(|(scale, taps)| SurfaceReads::ALL.map(|reads| Sampling::new(scale, reads, taps)))
+            .map(|sampling| (self.cost(&sampling, nodes), sampling))
             .collect();
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let tolerance_dn = quality.max_error_dn;
@@ -212,23 +216,23 @@ impl<'a> Prospect<'a> {
             Some(samples) => vec![f64::from(samples)],
             None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
         };
-        let way = |scale: f64, taps: TapStage, samples_per_px: f64| {
+        let way = |sampling: Sampling, samples_per_px: f64| {
             let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
             let blur = (nodes > 1).then_some(BlurStage { nodes, one_depth: false, samples_per_px, max_samples });
-            (Sampling { scale, taps, samples_per_px, expected: Expected::default() }, blur)
+            (Sampling { samples_per_px, ..sampling }, blur)
         };
         // A few places tell what is far from keeping the tolerance.
-        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, sampling.scale, sampling.taps, blur).total_dn();
+        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, &sampling, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
-            let expected = self.expected(sampling.scale, sampling.taps, blur);
+            let expected = self.expected(&sampling, blur);
             Sampling { expected, ..sampling }
         };
         let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;
-        for (_, scale, taps) in ways {
+        for (_, sampling) in ways {
             // The most samples first: if those do not do, fewer need not be tried.
-            let choices = if nodes > 1 { per_px(scale) } else { vec![0.0] };
+            let choices = if nodes > 1 { per_px(sampling.scale) } else { vec![0.0] };
             let Some((&last, fewer)) = choices.split_last() else { continue };
-            let most = way(scale, taps, last);
+            let most = way(sampling, last);
             let rough_dn = roughly_dn(most);
             let tried = Some(most).filter(|_| rough_dn <= FAR * tolerance_dn).map(exactly);
             let total_dn = tried.map_or(rough_dn, |tried| tried.expected.total_dn());
@@ -236,13 +240,13 @@ impl<'a> Prospect<'a> {
                 None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
                 None => {}
                 Some(most) => {
-                    let fewer = fewer.iter().map(|&samples| way(scale, taps, samples));
+                    let fewer = fewer.iter().map(|&samples| way(sampling, samples));
                     let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(exactly);
                     return { near }.find(|way| way.expected.total_dn() <= tolerance_dn).unwrap_or(most);
                 }
             }
         }
-        let none = Sampling { scale: least_scale, taps: TapStage::Spline, samples_per_px: 2.0, expected: Expected::default() };
+        let none = Sampling { samples_per_px: 2.0, ..Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline) };
         best.map_or(none, |(_, way)| exactly(way))
     }
 
@@ -258,7 +262,8 @@ impl<'a> Prospect<'a> {
     }
 
     /// Time of a way, in bilinear reads of an output pixel.
-    fn cost(&self, scale: f64, taps: TapStage, nodes: u32) -> f64 {
+    fn cost(&self, sampling: &Sampling, nodes: u32) -> f64 {
+        let &Sampling { scale, surface_reads, taps, .. } = sampling;
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
@@ -270,7 +275,7 @@ impl<'a> Prospect<'a> {
             reads * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
         };
         let reads = self.sights.iter().map(of).sum::<f64>() / self.sights.len().max(1) as f64;
-        scale * scale * IDEAL_COST + reads
+        scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
     }
 }
 
@@ -350,9 +355,14 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: E
 }
 
 impl Sampling {
+    /// Of which nothing is expected yet.
+    fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
+        Self { scale, surface_reads, taps, samples_per_px: 0.0, expected: Expected::default() }
+    }
+
     /// The paper's: one bilinear read a sample.
     pub fn of_paper() -> Self {
-        Self { scale: 1.0, taps: TapStage::Bilinear, samples_per_px: 0.0, expected: Expected::default() }
+        Self::new(1.0, SurfaceReads::Grid, TapStage::Bilinear)
     }
 
     /// The exposure's samples between so many nodes, for paths of up to `blur_px` ideal pixels.

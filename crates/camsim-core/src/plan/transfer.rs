@@ -5,7 +5,7 @@
 //! | stage | leaves |
 //! |---|---|
 //! | texture, bilinear between texels | `sinc^2(nu_x) sinc^2(nu_y)` |
-//! | surface filter, a grid of reads of a smaller version | mean over the grid, times what a version of 2^m texels has |
+//! | surface filter, some reads of a smaller version | mean over the reads, times what a version of 2^m texels has |
 //! | bilinear read between ideal pixels | `sinc^2(f_x) sinc^2(f_y)`, and as much of `f + k` for whole `k` |
 //! | spline | that of Catmull and Rom's kernel and of the B-spline, mixed by softness; the same aliases |
 //! | grid of reads, samples on a path | `sin(pi n x) / (n sin(pi x))` of the step along each |
@@ -15,7 +15,10 @@ use std::f64::consts::{LN_2, PI};
 
 use glam::{DMat2, DVec2};
 
-use super::grain::{Spectrum, mean_of};
+use super::{
+    SurfaceReads,
+    grain::{Spectrum, mean_of},
+};
 use crate::temporal::Footprint;
 
 /// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
@@ -27,7 +30,10 @@ const DIRECTIONS: u32 = 6;
 const MOST_CYCLES: f64 = 1.5;
 /// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of the wave.
 const UNSEEN: f64 = 1e-3;
-/// As in shaders/ideal/surface.wgsl.
+/// As in shaders/ideal/surface.wgsl and shaders/ideal/reads.
+const CLOSE_TEXELS: f64 = 0.8;
+const CELL_VARIANCE: f64 = 1.5;
+const IN_A_ROW: f64 = 1.6;
 const MAX_TAPS: f64 = 32.0;
 const SHORT_TAPS: f64 = 2.0;
 const ONE_TAP: f64 = 0.5;
@@ -60,7 +66,28 @@ fn evenly(n: u32, x: f64) -> f64 {
     mean_of(n, x / f64::from(n))
 }
 
-/// The filter of the ideal frame's surfaces. Twin of `picture_at` in shaders/ideal/surface.wgsl.
+/// A smaller version of a picture.
+struct Version {
+    level: f64,
+    /// Times 12, beyond what the picture has between its texels, texels^2: `3 (4^level - 1)`, a mixture between whole levels.
+    variance: f64,
+}
+
+impl Version {
+    fn of_level(level: f64) -> Self {
+        Self { level, variance: 3.0 * ((2.0 * level.floor()).exp2() * (1.0 + 3.0 * (level - level.floor())) - 1.0) }
+    }
+
+    /// For reads `cell` texels apart.
+    fn for_cell(cell: f64) -> Self {
+        let variance = if cell > CLOSE_TEXELS { CELL_VARIANCE * cell * cell } else { 0.0 };
+        let texels2 = variance / 3.0 + 1.0;
+        let below = (0.5 * texels2.log2()).floor();
+        Self { level: below + (texels2 / (2.0 * below).exp2() - 1.0) / 3.0, variance }
+    }
+}
+
+/// The filter of the ideal frame's surfaces. Twin of `picture_at` in shaders/ideal/reads.
 pub(super) struct SurfaceFilter {
     /// d(texel)/d(ideal px), and what takes a frequency from cycles an ideal pixel to cycles a texel.
     texel_from_ideal: DMat2,
@@ -72,25 +99,30 @@ pub(super) struct SurfaceFilter {
 }
 
 impl SurfaceFilter {
-    pub fn new(texel_from_ideal: DMat2) -> Self {
+    pub fn new(texel_from_ideal: DMat2, reads: SurfaceReads) -> Self {
         let DMat2 { x_axis: dx, y_axis: dy } = texel_from_ideal;
         let [a, b, c] = [dx.x * dx.x + dy.x * dy.x, dx.x * dx.y + dy.x * dy.y, dx.y * dx.y + dy.y * dy.y];
         let mean = 0.5 * (a + c);
         let spread = (0.25 * (a - c) * (a - c) + b * b).sqrt();
         let (longer, shorter) = ((mean + spread).sqrt(), (mean - spread).max(0.0).sqrt());
-        let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };
-        let covered = (shorter / short_taps).max(1.0);
-        let long_taps = (longer / covered - 0.1).ceil().clamp(short_taps, MAX_TAPS);
         let along = if spread > 1e-6 * mean {
             let both = if a >= c { DVec2::new(0.5 * (a - c) + spread, b) } else { DVec2::new(b, 0.5 * (c - a) + spread) };
             both.normalize_or(DVec2::X)
         } else {
             DVec2::X
         };
-        let level = (longer / long_taps).max(covered).log2();
-        let (below, share) = (level.floor(), level.fract());
-        let version = 3.0 * ((2.0 * below).exp2() * (1.0 + 3.0 * share) - 1.0);
-        let length = |side: f64, taps: f64| ((side * side - version).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt();
+        let ([long_taps, short_taps], Version { level, variance }) = match reads {
+            SurfaceReads::Two => ([2.0, 1.0], Version::for_cell((0.5 * longer).max(shorter))),
+            SurfaceReads::Four if longer < IN_A_ROW * shorter.max(1.0) => ([2.0, 2.0], Version::for_cell(0.5 * longer)),
+            SurfaceReads::Four => ([4.0, 1.0], Version::for_cell((0.25 * longer).max(shorter))),
+            SurfaceReads::Grid => {
+                let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };
+                let covered = (shorter / short_taps).max(1.0);
+                let long_taps = (longer / covered - 0.1).ceil().clamp(short_taps, MAX_TAPS);
+                ([long_taps, short_taps], Version::of_level((longer / long_taps).max(covered).log2()))
+            }
+        };
+        let length = |side: f64, taps: f64| ((side * side - variance).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt();
         Self {
             texel_from_ideal,
             texel_cycles: texel_from_ideal.inverse().transpose(),
@@ -277,18 +309,61 @@ mod tests {
     #[test]
     fn the_surface_filter_has_the_variance_of_the_pixel() {
         // 1 - 2 pi^2 f^2 variance for low frequencies; a pixel has 1/12.
+        let of = |sides: DVec2, reads, f: DVec2| {
+            let filter = SurfaceFilter::new(DMat2::from_diagonal(sides), reads);
+            12.0 * (1.0 - filter.leaves(f / sides)) / (2.0 * PI * PI * f.length_squared())
+        };
         for texels in [0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.5, 8.0] {
-            let filter = SurfaceFilter::new(DMat2::from_diagonal(DVec2::splat(texels)));
-            let f = 0.02;
-            let variance = (1.0 - filter.leaves(DVec2::new(f / texels, 0.0))) / (2.0 * PI * PI * f * f);
-            assert!((12.0 * variance - 1.0).abs() < 0.03, "{texels}: {}", 12.0 * variance);
+            for reads in [SurfaceReads::Four, SurfaceReads::Grid] {
+                let variance = of(DVec2::splat(texels), reads, DVec2::new(0.02, 0.0));
+                assert!((variance - 1.0).abs() < 0.03, "{reads:?}, {texels}: {variance}");
+            }
+            // Twice as long: no filter may fail along the longer axis.
+            for reads in SurfaceReads::ALL {
+                let variance = of(DVec2::new(2.0 * texels, texels), reads, DVec2::new(0.02, 0.0));
+                assert!((variance - 1.0).abs() < 0.03, "{reads:?}, {texels} twice as long: {variance}");
+            }
+        }
+        // Two reads of a square: what stands for the cell.
+        let variance = of(DVec2::splat(2.0), SurfaceReads::Two, DVec2::new(0.0, 0.02));
+        assert!((variance - CELL_VARIANCE).abs() < 0.03, "{variance}");
+    }
+
+    #[test]
+    fn more_reads_are_nearer_to_the_pixel() {
+        // Of a texture with the power 1 / nu^2, what is left of its waves against the mean over the pixel, RMS of the texture's own.
+        let error = |sides: DVec2, reads| {
+            let filter = SurfaceFilter::new(DMat2::from_diagonal(sides), reads);
+            let waves = (0..56 * 56).map(|i| {
+                let cycles = (DVec2::new(f64::from(i % 56), f64::from(i / 56)) - 27.5) / 20.0;
+                let power = (sinc(cycles.x) * sinc(cycles.y)).powi(4) / (cycles - cycles.round()).length_squared();
+                let exact = sinc(sides.x * cycles.x) * sinc(sides.y * cycles.y);
+                (power, power * (filter.leaves(cycles) - exact).powi(2))
+            });
+            let (all, wrong) = waves.fold((0.0, 0.0), |sum, wave| (sum.0 + wave.0, sum.1 + wave.1));
+            (wrong / all).sqrt()
+        };
+        // Texels along and across, and what two reads, four and the grid miss: measured, rounded up.
+        let expected = [
+            ([0.7, 0.7], [0.05, 0.01, 0.01]),
+            ([1.0, 1.0], [0.07, 0.02, 0.02]),
+            ([2.0, 2.0], [0.10, 0.05, 0.06]),
+            ([3.0, 1.0], [0.08, 0.04, 0.04]),
+            ([8.0, 1.0], [0.20, 0.08, 0.02]),
+            ([8.0, 4.0], [0.10, 0.08, 0.04]),
+            ([16.0, 2.0], [0.20, 0.10, 0.03]),
+        ];
+        for (sides, most) in expected {
+            let found = SurfaceReads::ALL.map(|reads| error(DVec2::from_array(sides), reads));
+            eprintln!("{sides:?}: {found:.3?} of {most:?}");
+            assert!((0..3).all(|k| found[k] <= most[k]), "{sides:?}: {found:?}");
         }
     }
 
     #[test]
     fn an_aligned_pixel_reads_nothing_between_pixels_and_one_beside_does() {
         let spectrum = Spectrum::flat(-2.0);
-        let filter = SurfaceFilter::new(DMat2::IDENTITY);
+        let filter = SurfaceFilter::new(DMat2::IDENTITY, SurfaceReads::Grid);
         let error = |stage, beside_px| {
             let area = Footprint::new(DVec2::X, DVec2::Y, stage);
             error2(&spectrum, &filter, DMat2::IDENTITY, &area, None, beside_px)[0]
