@@ -8,6 +8,7 @@ use serde::Serialize;
 
 pub mod displacement;
 pub mod edges;
+pub mod fine;
 pub mod lines;
 pub mod paper;
 

@@ -21,17 +21,19 @@ use wgpu::util::DeviceExt;
 
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
-    ideal::{IdealPass, IdealSlot, IdealTarget, STORED_FORMAT},
-    layout::{FrameUniforms, Truth},
+    ideal::{IdealPass, IdealTarget, STORED_FORMAT},
+    layout::Truth,
     recorder::{PassClock, PassTime, Recorder},
-    reverse::{EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass, list_size},
+    reverse::{EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
     shaders::ComposeError,
     upload::SceneBuffers,
 };
 
 mod readback;
+mod slot;
 
 use readback::{Output, coords, read_mapped, read_texture};
+use slot::{Slot, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
 const FRAMES_IN_FLIGHT: usize = 2;
@@ -190,18 +192,6 @@ pub struct Session<'a> {
     coords_phase: f32,
 }
 
-/// Buffers of one frame in flight.
-#[derive(Debug)]
-struct Slot {
-    /// One for each ideal frame, as many as any frame needed so far.
-    ideal: Vec<IdealSlot>,
-    frame: wgpu::Buffer,
-    poses: wgpu::Buffer,
-    color: Output,
-    truth: Option<Output>,
-    clock: Option<PassClock>,
-}
-
 /// A submitted frame.
 struct InFlight {
     slot: usize,
@@ -240,44 +230,6 @@ pub struct Finished {
     pub lod: LodSelection,
     /// Where its time went.
     pub times: FrameTimes,
-}
-
-impl Slot {
-    fn new(gpu: &GpuContext, ideal_pass: &IdealPass, sequence: &Sequence, buffers: &SceneBuffers, truth: bool) -> Self {
-        let [width, height] = sequence.scenario.camera.size_px.map(u64::from);
-        let frame = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("camsim.frame"),
-            size: size_of::<FrameUniforms>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        Self {
-            ideal: vec![ideal_pass.slot(gpu, &sequence.scene, buffers)],
-            frame,
-            poses: pose_buffer(gpu, 48 * width.max(height)),
-            color: Output::new(gpu, "camsim.color", 16 * width * height),
-            truth: truth.then(|| Output::new(gpu, "camsim.truth", size_of::<Truth>() as u64 * width * height)),
-            clock: None,
-        }
-    }
-}
-
-fn pose_buffer(gpu: &GpuContext, size: u64) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.poses"),
-        size,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
-fn list_buffer(gpu: &GpuContext, size_px: [u32; 2]) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.listed"),
-        size: list_size(size_px),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
 }
 
 impl Session<'_> {

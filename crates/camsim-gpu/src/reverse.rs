@@ -8,7 +8,7 @@ use std::collections::{HashMap, hash_map::Entry};
 use camsim_core::{
     photometric::is_mono,
     plan::{EdgeStage, FramePlan, LinearFog, NEAR_M, RayStage, TemporalStage, table_shape},
-    scenario::{Preset, Scenario},
+    scenario::Scenario,
     shutter::LinesAxis,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
 };
@@ -19,10 +19,13 @@ use crate::{
     ideal::{FineTarget, key_rows},
     layout::FrameUniforms,
     recorder::Recorder,
-    shaders::{self, ComposeError, Slot},
+    shaders::{self, ComposeError},
 };
 
+mod key;
 pub mod lens_inverse;
+
+pub use key::{EdgeKind, PipelineKey, TapKind, TemporalKind};
 
 /// The kernel's main file.
 pub const SHADER: &str = "reverse/reverse.wgsl";
@@ -30,215 +33,6 @@ pub const SHADER: &str = "reverse/reverse.wgsl";
 pub const RAYS_SHADER: &str = "reverse/rays.wgsl";
 /// Edge of the square workgroups.
 const WORKGROUP_PX: u32 = 8;
-
-/// Temporal inverse without its numbers: numbers go into uniforms, never into a key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "as camsim_core::plan::TemporalStage")]
-pub enum TemporalKind {
-    Identity,
-    Rotation,
-    Reproject,
-    Linear,
-    Rk2,
-}
-
-/// What reads the ideal frame, without its number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "as camsim_core::temporal::TapStage")]
-pub enum TapKind {
-    Bilinear,
-    Spline,
-    Grid,
-}
-
-impl From<TapStage> for TapKind {
-    fn from(stage: TapStage) -> Self {
-        match stage {
-            TapStage::Bilinear => Self::Bilinear,
-            TapStage::Spline => Self::Spline,
-            TapStage::Grid { .. } => Self::Grid,
-        }
-    }
-}
-
-/// Rays of their own at silhouettes, without their numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EdgeKind {
-    /// None.
-    None,
-    /// Samples of depth, colours of pixels.
-    Centres,
-    /// Samples of depth and colour.
-    Samples,
-}
-
-impl From<EdgeStage> for EdgeKind {
-    fn from(stage: EdgeStage) -> Self {
-        match stage {
-            EdgeStage::None => Self::None,
-            EdgeStage::Supersampled { scale: 1, .. } => Self::Centres,
-            EdgeStage::Supersampled { .. } => Self::Samples,
-        }
-    }
-}
-
-/// Which stages a kernel is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct PipelineKey {
-    /// Lens inverse.
-    pub ray: RayStage,
-    /// Temporal inverse.
-    pub temporal: TemporalKind,
-    /// Exposure.
-    pub blur: bool,
-    /// All nodes of the exposure take the depth of mid-exposure.
-    pub one_depth: bool,
-    /// What reads the ideal frame.
-    pub tap: TapKind,
-    /// More than one ideal frame.
-    pub keys: bool,
-    /// Rays of their own at silhouettes.
-    pub edges: EdgeKind,
-    /// Depth and coordinates beside the picture.
-    pub truth: bool,
-    /// The paper preset: stored values, straight blur, nearest depth.
-    pub paper: bool,
-}
-
-impl PipelineKey {
-    /// The key of a plan.
-    #[must_use]
-    pub fn of(plan: &FramePlan) -> Self {
-        let temporal = match plan.temporal {
-            TemporalStage::Identity => TemporalKind::Identity,
-            TemporalStage::Rotation => TemporalKind::Rotation,
-            TemporalStage::Reproject { .. } => TemporalKind::Reproject,
-            TemporalStage::Linear => TemporalKind::Linear,
-            TemporalStage::Rk2 => TemporalKind::Rk2,
-        };
-        Self {
-            ray: plan.ray,
-            temporal,
-            blur: plan.blur.is_some(),
-            one_depth: plan.blur.is_some_and(|blur| blur.one_depth),
-            tap: plan.taps.into(),
-            keys: plan.keys.len() > 1,
-            edges: plan.edges.into(),
-            truth: plan.truth,
-            paper: plan.preset == Preset::Paper,
-        }
-    }
-
-    /// Every key that a plan can have.
-    #[must_use]
-    pub fn all() -> Vec<Self> {
-        use TemporalKind::{Identity, Linear, Reproject, Rk2, Rotation};
-        let mut keys = Vec::new();
-        for ray in [RayStage::Pinhole, RayStage::LensMap] {
-            for temporal in [Identity, Rotation, Linear, Rk2, Reproject] {
-                for blur in [false, true] {
-                    // Without motion there is no blur.
-                    if blur && temporal == Identity {
-                        continue;
-                    }
-                    // Without parallax all key cameras see the same.
-                    let parallax = temporal == TemporalKind::Reproject;
-                    for (several, edges) in [false, true]
-                        .into_iter()
-                        .flat_map(|several| [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (several, edges)))
-                    {
-                        if several && !parallax {
-                            continue;
-                        }
-                        let looks_up = blur && temporal == Reproject;
-                        for one_depth in [false, true].into_iter().filter(|&one_depth| looks_up || !one_depth) {
-                            for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
-                                keys.extend([false, true].map(|truth| Self {
-                                    ray,
-                                    temporal,
-                                    blur,
-                                    one_depth,
-                                    tap,
-                                    keys: several,
-                                    edges,
-                                    truth,
-                                    paper: false,
-                                }));
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        for ray in [RayStage::Pinhole, RayStage::GaussNewton] {
-            for blur in [false, true] {
-                keys.extend([false, true].map(|truth| Self {
-                    ray,
-                    temporal: Rk2,
-                    blur,
-                    one_depth: false,
-                    tap: TapKind::Bilinear,
-                    keys: false,
-                    edges: EdgeKind::None,
-                    truth,
-                    paper: true,
-                }));
-            }
-        }
-        keys
-    }
-
-    /// Fillings of the kernel's slots.
-    #[must_use]
-    pub fn slots(&self) -> [Slot; 11] {
-        let ray = match self.ray {
-            RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
-            RayStage::LensMap => "reverse/ray/map.wgsl",
-            RayStage::GaussNewton => "reverse/ray/gauss_newton.wgsl",
-        };
-        let temporal = match self.temporal {
-            TemporalKind::Identity => "reverse/temporal_inverse/identity.wgsl",
-            TemporalKind::Rotation => "reverse/temporal_inverse/rotation.wgsl",
-            TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
-            TemporalKind::Linear => "reverse/temporal_inverse/linear.wgsl",
-            TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
-        };
-        let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
-        let gather = match (self.blur, self.paper) {
-            (false, _) => "reverse/gather/sharp.wgsl",
-            (true, false) => "reverse/gather/blur.wgsl",
-            (true, true) => "reverse/gather/straight.wgsl",
-        };
-        let tap = match self.tap {
-            TapKind::Bilinear => "reverse/gather/tap/bilinear.wgsl",
-            TapKind::Spline => "reverse/gather/tap/spline.wgsl",
-            TapKind::Grid => "reverse/gather/tap/grid.wgsl",
-        };
-        let (depth, color) = match self.paper {
-            false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
-            true => ("reverse/depth/nearest.wgsl", "reverse/color/stored.wgsl"),
-        };
-        let edges = if self.edges == EdgeKind::None { "reverse/edges/none.wgsl" } else { "reverse/edges/listed.wgsl" };
-        let surface_color = match self.edges {
-            EdgeKind::Samples => "reverse/edges/color/samples.wgsl",
-            EdgeKind::None | EdgeKind::Centres => "reverse/edges/color/centres.wgsl",
-        };
-        let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
-        [
-            ("keys", keys),
-            ("ray", ray),
-            ("depth", depth),
-            ("temporal_inverse", temporal),
-            ("gather", gather),
-            ("nodes", if self.one_depth { "reverse/gather/nodes/one_depth.wgsl" } else { "reverse/gather/nodes/own_depth.wgsl" }),
-            ("tap", tap),
-            ("edges", edges),
-            ("surface_color", surface_color),
-            ("color", color),
-            ("emit", emit),
-        ]
-    }
-}
 
 /// What a dispatch reads and writes.
 #[derive(Debug)]
@@ -509,33 +303,5 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
         key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),
         ..FrameUniforms::default()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-
-    use camsim_core::plan::SurfaceReads;
-
-    use super::*;
-
-    #[test]
-    fn every_variant_is_valid_without_any_capability() {
-        let texts = PipelineKey::all().into_iter().flat_map(|key| {
-            let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, RAYS_SHADER] };
-            files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
-        });
-        let surfaces = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].into_iter().flat_map(|file| {
-            SurfaceReads::ALL
-                .map(|reads| (format!("{file} {reads:?}"), shaders::compose(file, &[crate::ideal::reads_slot(reads)]).unwrap()))
-        });
-        let resolve = ["ideal/resolve.wgsl", "ideal/reach.wgsl"].map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
-        for (name, text) in texts.chain(surfaces).chain(resolve) {
-            let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
-            let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
-            validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-        }
-        assert_eq!(PipelineKey::all().len(), 476);
     }
 }

@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::edges::FineImage;
+use super::fine::FineImage;
 
 /// Half of the length along which samples must agree on a line, fine pixels: tried in this order.
 const REACH: [f64; 2] = [4.0, 2.0];

@@ -11,7 +11,7 @@ use camsim_core::{
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
     temporal::{
-        edges::{Centre, FineImage},
+        fine::{Centre, FineImage},
         lines::EdgeLine,
     },
 };

@@ -1,0 +1,64 @@
+//! Stages that a frame's kernels are made of.
+
+use serde::Serialize;
+
+/// How an output pixel gets its ideal ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RayStage {
+    /// Closed form, no map.
+    Pinhole,
+    /// A lens map, computed once per lens and zoom value.
+    LensMap,
+    /// The paper's Gauss-Newton inverse, for each pixel of each frame.
+    GaussNewton,
+}
+
+/// How a line's own instant is taken back to the ideal frame's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TemporalStage {
+    /// Nothing moves within the frame.
+    Identity,
+    /// Rotation only.
+    Rotation,
+    /// Relative pose and depth.
+    Reproject {
+        /// Depth look-ups.
+        iterations: u32,
+    },
+    /// One straight step at constant twist and depth (eq. 16).
+    Linear,
+    /// Heun's steps of at most 2.5 deg at constant twist and depth (eq. 18).
+    Rk2,
+}
+
+/// How a pixel of the ideal frame reads the picture of the surface that it shows. The order is that of cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfaceReads {
+    /// Two reads along the pixel's longer axis.
+    Two,
+    /// Four: two by two, or in a row where the pixel is long.
+    Four,
+    /// One or two across, and up to 32 along.
+    Grid,
+}
+
+impl SurfaceReads {
+    /// All of them, each at its own number.
+    pub const ALL: [Self; 3] = [Self::Two, Self::Four, Self::Grid];
+}
+
+/// Motion blur.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BlurStage {
+    /// Exactly known poses over the exposure.
+    pub nodes: u32,
+    /// All of them take the key frame's depth that mid-exposure finds; otherwise each looks up its own.
+    pub one_depth: bool,
+    /// Samples a pixel of path (up to 16 px; one a pixel beyond).
+    pub samples_per_px: f64,
+    /// Cap of the samples between two nodes.
+    pub max_samples: u32,
+}
