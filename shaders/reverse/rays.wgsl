@@ -24,11 +24,12 @@ struct Listed {
 @group(3) @binding(2) var<storage, read> listed: Listed;
 
 @compute @workgroup_size(64)
-fn rays(@builtin(global_invocation_id) id: vec3<u32>) {
-    if (id.x >= listed.count) {
+fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let place = id.y * groups.x * 64u + id.x;
+    if (place >= listed.count) {
         return;
     }
-    let word = listed.pixels[id.x];
+    let word = listed.pixels[place];
     let pixel = vec2<u32>(word & 0x7fffu, (word >> 15u) & 0x7fffu);
     let marked = (word >> 31u) != 0u;
     let ray = lens_ray(pixel);

@@ -3,9 +3,9 @@
 #import reverse/edges/near.wgsl
 
 struct Listed {
-    // Arguments of the next pass's dispatch: workgroups of 64 along x, 1, 1.
-    groups: atomic<u32>,
-    groups_y: u32,
+    // Arguments of the next pass's dispatch, in workgroups of 64: along x, then rows of MOST_GROUPS, and 1.
+    groups_x: atomic<u32>,
+    groups_y: atomic<u32>,
     groups_z: u32,
     count: atomic<u32>,
     // x | y << 15 | whether the plain gather met a mark << 31.
@@ -13,6 +13,9 @@ struct Listed {
 }
 
 @group(3) @binding(2) var<storage, read_write> listed: Listed;
+
+// Workgroups along x at most: every adapter has 65535 along each axis.
+const MOST_GROUPS: u32 = 32768u;
 
 // Whether rays of this pixel may meet another surface than the plain gather did.
 fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
@@ -30,6 +33,8 @@ fn list_for_rays(pixel: vec2<u32>, ray: Ray, plain: Gathered) {
     if (marked || ((HAS_PARALLAX || EMITS_RAYS) && may_meet_others(pixel, ray))) {
         let place = atomicAdd(&listed.count, 1u);
         listed.pixels[place] = pixel.x | (pixel.y << 15u) | (u32(marked) << 31u);
-        atomicMax(&listed.groups, place / 64u + 1u);
+        let group = place / 64u;
+        atomicMax(&listed.groups_x, min(group, MOST_GROUPS - 1u) + 1u);
+        atomicMax(&listed.groups_y, group / MOST_GROUPS + 1u);
     }
 }
