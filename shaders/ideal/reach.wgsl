@@ -11,33 +11,29 @@ fn joined(a: u32, b: u32) -> u32 {
     return (max(a, b) & 0xfffffffeu) | ((a | b) & 1u);
 }
 
+// Over the tiles within reach along one axis: a tile's own place on it, its length, the distance of neighbours in the buffer.
+fn within_reach(tile: u32, place: u32, length: u32, stride: u32) -> u32 {
+    let first = max(place, tile_layout.z) - tile_layout.z;
+    let last = min(place + tile_layout.z, length - 1u);
+    var found = 0u;
+    for (var i = first; i <= last; i++) {
+        found = joined(found, tiles_in[tile - place * stride + i * stride]);
+    }
+    return found;
+}
+
 @compute @workgroup_size(64)
 fn along_rows(@builtin(global_invocation_id) id: vec3<u32>) {
     let tile = id.x;
-    if (tile >= tile_layout.x * tile_layout.y) {
-        return;
+    if (tile < tile_layout.x * tile_layout.y) {
+        tiles_out[tile] = within_reach(tile, tile % tile_layout.x, tile_layout.x, 1u);
     }
-    let x = tile % tile_layout.x;
-    let last = min(x + tile_layout.z, tile_layout.x - 1u);
-    var found = 0u;
-    for (var i = max(x, tile_layout.z) - tile_layout.z; i <= last; i++) {
-        found = joined(found, tiles_in[tile - x + i]);
-    }
-    tiles_out[tile] = found;
 }
 
 @compute @workgroup_size(64)
 fn along_columns(@builtin(global_invocation_id) id: vec3<u32>) {
     let tile = id.x;
-    if (tile >= tile_layout.x * tile_layout.y) {
-        return;
+    if (tile < tile_layout.x * tile_layout.y) {
+        tiles_out[tile] = within_reach(tile, tile / tile_layout.x, tile_layout.y, tile_layout.x);
     }
-    let x = tile % tile_layout.x;
-    let y = tile / tile_layout.x;
-    let last = min(y + tile_layout.z, tile_layout.y - 1u);
-    var found = 0u;
-    for (var i = max(y, tile_layout.z) - tile_layout.z; i <= last; i++) {
-        found = joined(found, tiles_in[i * tile_layout.x + x]);
-    }
-    tiles_out[tile] = found;
 }

@@ -12,15 +12,29 @@ fn inside_ideal(at_px: vec2<f32>) -> bool {
     return all(at_px >= vec2<f32>(-0.5)) && all(at_px <= vec2<f32>(frame.ideal_size_px) - 0.5);
 }
 
-// Inverse planar depth 1/z, 1/m: bilinear in 1/z, which is exact on planes; the nearest texel where the four belong to different surfaces.
-fn inverse_depth(at_px: vec2<f32>) -> f32 {
+// The four texels around a place: the first one, the last one, and how far the place is from the first to the last.
+struct Around {
+    first: vec2<i32>,
+    last: vec2<i32>,
+    t: vec2<f32>,
+}
+
+// Of the ideal frame in use; places outside go to its border.
+fn texels_around(at_px: vec2<f32>) -> Around {
     let last = vec2<f32>(frame.ideal_size_px) - 1.0;
     let at = clamp(at_px, vec2<f32>(0.0), last);
     let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
-    let t = at - base;
-    let first = vec2<i32>(0, key_row());
-    let b = first + vec2<i32>(base);
-    let top = min(b + 1, first + vec2<i32>(last));
+    let origin = vec2<i32>(0, key_row());
+    let first = origin + vec2<i32>(base);
+    return Around(first, min(first + 1, origin + vec2<i32>(last)), at - base);
+}
+
+// Inverse planar depth 1/z, 1/m: bilinear in 1/z, which is exact on planes; the nearest texel where the four belong to different surfaces.
+fn inverse_depth(at_px: vec2<f32>) -> f32 {
+    let around = texels_around(at_px);
+    let b = around.first;
+    let top = around.last;
+    let t = around.t;
     let d00 = textureLoad(ideal_depth, b, 0).x;
     let d10 = textureLoad(ideal_depth, vec2<i32>(top.x, b.y), 0).x;
     let d01 = textureLoad(ideal_depth, vec2<i32>(b.x, top.y), 0).x;

@@ -20,7 +20,9 @@ const BLOCK_CELLS: u32 = 8;
 const FACING_MARGIN: f64 = 0.95;
 /// From this tolerance (1/255 RMS) on silhouettes are left as one sample a pixel shows them.
 const IGNORED_DN: f64 = 16.0;
-/// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4 samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is 0.5/255 over the picture.
+/// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4
+/// samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is
+/// 0.5/255 over the picture.
 const COARSE_DN: f64 = 1.0;
 /// Depth of 4 samples and the border between them, and with more than one fine pixel a pixel the colours of the samples.
 pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 4 + 8 + 4 * 8;
@@ -35,7 +37,8 @@ const MAX_FLAT_VERTICES: usize = 64;
 pub enum EdgeStage {
     /// No silhouette in view: one sample a pixel of the ideal frame.
     None,
-    /// The ideal frame keeps `4 scale^2` samples of depth a pixel (with `scale` above 1 of colour too), and an output pixel that sees a silhouette takes `samples` rays of its own.
+    /// The ideal frame keeps `4 scale^2` samples of depth a pixel (with `scale` above 1 of colour too), and an output pixel that sees a
+    /// silhouette takes `samples` rays of its own.
     Supersampled {
         /// Fine pixels along a side of an ideal pixel, each with 4 samples.
         scale: u32,
@@ -46,13 +49,20 @@ pub enum EdgeStage {
 
 /// Margin of [`FramePlan::mark_reach_px`], ideal pixels: for the reads around a place, and for what rounds.
 const REACH_MARGIN_PX: f64 = 3.0;
+/// Rays are looked at from this many times the inverse depth of the nearest surface on, and a line's camera that moves towards it gives it
+/// at most [`MOST_STRETCH`] times that: as in `shaders/reverse/edges/near.wgsl`.
+const LOOK_NEARER: f64 = 1.02;
+const MOST_STRETCH: f64 = 4.0;
 
 impl FramePlan {
-    /// How far from a pixel's source the rays of that pixel may look, ideal pixels: its parallax, and a little more.
+    /// How far from a pixel's source the rays of that pixel may look, ideal pixels. Their parallax: `w' = w / (1 - t_z w)` is at most the
+    /// inverse depth that a line's camera gives to the nearest surface `w`, and `shaders/reverse/edges/near.wgsl`, which bounds it likewise,
+    /// begins 2 % nearer than that.
     #[must_use]
     pub fn mark_reach_px(&self) -> u32 {
+        let approach = (LOOK_NEARER * self.motion.travel_m / self.motion.nearest_m).min(1.0 - 1.0 / MOST_STRETCH);
         // Saturates: then every mark reaches everything.
-        (1.1 * self.motion.parallax_px + REACH_MARGIN_PX).ceil() as u32
+        (LOOK_NEARER * self.motion.parallax_px / (1.0 - approach) + REACH_MARGIN_PX).ceil() as u32
     }
 }
 

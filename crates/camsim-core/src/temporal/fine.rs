@@ -1,5 +1,5 @@
-//! An ideal frame with several samples a pixel, and what it shows at a place. f64 twin of `shaders/reverse/edges/supersampled.wgsl` (samples) and of
-//! `shaders/reverse/edges/color/` (colours).
+//! An ideal frame with several samples a pixel, and what it shows at a place. f64 twin of `shaders/reverse/edges/supersampled.wgsl`
+//! (samples) and of `shaders/reverse/edges/color/` (colours).
 
 use glam::{DVec2, DVec3};
 
@@ -7,9 +7,10 @@ use super::lines::{EdgeLine, edge_line};
 
 /// Depths this near to each other, relative to the nearer one, are of one surface.
 const SURFACE_STEP: f64 = 0.005;
-/// A slope has the mean of two depths half-way between their places; off by more than this share of their difference it is a step.
+/// A slope has the mean of two depths half-way between their places, a step one of the two: off by half of their difference. Samples
+/// stand up to half a fine pixel beside the places that they speak for, so a slope is off by some too.
 const HALF_WAY: f64 = 0.35;
-/// Bilinear weight from which pixels of the same surface give its colour.
+/// Bilinear weight from which pixels of the same surface give its colour: less is lost in single precision, far out in the frame.
 const LEAST_WEIGHT: f64 = 1e-3;
 
 /// What is at the middle of an ideal pixel.
@@ -81,8 +82,9 @@ impl FineImage<'_> {
         of_side(texel).or_else(|| of_side([beside(0), beside(1)])).unwrap_or(own)
     }
 
-    /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples have none, bilinear between those of the four pixels around it that show the same
-    /// surface as [`FineImage::inverse_depth`] has; where none does, the nearest in depth of the sixteen around it.
+    /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples have none, bilinear between
+    /// those of the four pixels around it that show the same surface as [`FineImage::inverse_depth`] has; where none does, the nearest in
+    /// depth of the sixteen around it.
     #[must_use]
     pub fn color(&self, at_px: DVec2) -> DVec3 {
         if let Some(&color) = self.sample_colors.get(self.sample(at_px)) {

@@ -5,9 +5,10 @@
 
 // Depths this near to each other, relative to the nearer one, are of one surface.
 const SURFACE_STEP: f32 = 0.005;
-// A slope has the mean of two depths half-way between their places; off by more than this share of their difference it is a step.
+// A slope has the mean of two depths half-way between their places, a step one of the two: off by half of their difference. Samples stand up to
+// half a fine pixel beside the places that they speak for, so a slope is off by some too.
 const HALF_WAY: f32 = 0.35;
-// Bilinear weight from which pixels of the same surface give its colour.
+// Bilinear weight from which pixels of the same surface give its colour: less is lost in the rounding of places far out in the frame.
 const LEAST_WEIGHT: f32 = 1e-3;
 
 // Whether a place whose sample has the depth value `depth` and a pixel with `other` show one surface: there is no step on the way.
@@ -25,19 +26,17 @@ fn one_surface(at_px: vec2<f32>, depth: f32, pixel: vec2<f32>, other: f32) -> bo
 fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
     let s = fine_sample(at_px);
     let depth = textureLoad(fine_depth, s.texel, s.index);
-    let last = vec2<f32>(frame.ideal_size_px) - 1.0;
-    let at = clamp(at_px, vec2<f32>(0.0), last);
-    let base = min(floor(at), max(last - 1.0, vec2<f32>(0.0)));
-    let t = at - base;
-    let first = vec2<i32>(0, key_row());
-    let b = first + vec2<i32>(base);
+    let origin = vec2<i32>(0, key_row());
+    let around = texels_around(at_px);
+    let base = vec2<f32>(around.first - origin);
+    let at = base + around.t;
     var sum = vec3<f32>(0.0);
     var weight = 0.0;
     for (var k = 0; k < 4; k++) {
         let step = vec2<f32>(f32(k & 1), f32(k >> 1u));
-        let texel = min(b + vec2<i32>(step), first + vec2<i32>(last));
+        let texel = min(around.first + vec2<i32>(step), around.last);
         if (one_surface(at, depth, base + step, textureLoad(centre_depth, texel, 0))) {
-            let sides = mix(1.0 - t, t, step);
+            let sides = mix(1.0 - around.t, around.t, step);
             let share = sides.x * sides.y;
             sum += share * textureLoad(ideal_color, texel, 0).rgb;
             weight += share;
@@ -46,10 +45,11 @@ fn surface_color_at(at_px: vec2<f32>) -> vec3<f32> {
     if (weight > LEAST_WEIGHT) {
         return sum / weight;
     }
-    var best = b;
+    let border = origin + vec2<i32>(frame.ideal_size_px) - 1;
+    var best = around.first;
     var least = 1e30;
     for (var i = 0; i < 16; i++) {
-        let texel = clamp(b + vec2<i32>(i % 4 - 1, i / 4 - 1), first, first + vec2<i32>(last));
+        let texel = clamp(around.first + vec2<i32>(i % 4 - 1, i / 4 - 1), origin, border);
         let off = abs(textureLoad(centre_depth, texel, 0) - depth);
         if (off < least) {
             least = off;
