@@ -12,6 +12,8 @@ const LINE_FARTHEST: f32 = 0.72;
 // Holds the slope of the logistic curve down; a separable set has no steepest one.
 const LINE_RIDGE: f32 = 0.03;
 const MOST_MEMBERS: u32 = 64u;
+// Samples that differ by less than this, relative to the nearest, are of one surface.
+const ONE_SURFACE: f32 = 0.02;
 
 // Samples that take part: place about the middle of the pixel, and 1 for the nearer surface or 0 for the farther.
 var<private> members: array<vec3<f32>, 64>;

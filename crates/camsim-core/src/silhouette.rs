@@ -5,8 +5,8 @@
 //! of it. Where depth bends by more than [`FOLD`] from one pixel to the next, as at the foot of a wall, it counts too: the renderer cannot tell
 //! such a fold from a step and casts rays of its own there.
 
-/// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend counts: that of `resolve.wgsl`.
-pub(crate) use crate::temporal::edges::EDGE_STEP as FOLD;
+/// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend counts: that of the renderer's marks.
+pub(crate) use crate::temporal::marks::EDGE_STEP as FOLD;
 /// Relative change of inverse depth.
 pub(crate) const STEP: f64 = 0.005;
 /// Distance from a silhouette within which a pixel counts as "at" it, output pixels.

@@ -10,6 +10,7 @@ pub mod displacement;
 pub mod edges;
 pub mod fine;
 pub mod lines;
+pub mod marks;
 pub mod paper;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.

@@ -20,11 +20,17 @@ use crate::{
 };
 
 mod fine;
+mod marks;
+mod near_marks;
 mod surfaces;
 
 pub use fine::{FINE_SAMPLES, FineTarget};
-use fine::{ResolvePass, scale_of, texture};
-use surfaces::{draw_meshes, draw_terrain, index_buffer, place_meshes, place_terrain};
+use fine::{TILE_PX, scale_of, texture};
+use marks::MarksPass;
+#[cfg(test)]
+pub(crate) use marks::spread_slot;
+use near_marks::{Kept, NearMarksPass};
+use surfaces::{Triangles, draw_meshes, draw_terrain, index_buffer, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -46,7 +52,7 @@ pub struct IdealTarget {
     pub color: wgpu::Texture,
     /// near / z.
     pub depth: wgpu::Texture,
-    /// Samples that colour and depth are resolved from, for frames with silhouettes.
+    /// What frames with silhouettes have besides.
     pub fine: Option<FineTarget>,
 }
 
@@ -69,14 +75,9 @@ impl IdealTarget {
     #[must_use]
     pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], edges: EdgeStage, preset: Preset) -> Self {
         let fine = scale_of(edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
-        // Resolved colour and depth are written by a compute pass.
-        let (depth_format, written) = match fine {
-            Some(_) => (wgpu::TextureFormat::R32Float, wgpu::TextureUsages::STORAGE_BINDING),
-            None => (DEPTH_FORMAT, wgpu::TextureUsages::RENDER_ATTACHMENT),
-        };
-        let usage = written | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(preset), 1, usage);
-        let depth = texture(gpu, "camsim.ideal.depth", allocated_px, depth_format, 1, usage);
+        let depth = texture(gpu, "camsim.ideal.depth", allocated_px, DEPTH_FORMAT, 1, usage);
         Self { allocated_px, color, depth, fine }
     }
 
@@ -84,7 +85,7 @@ impl IdealTarget {
     #[must_use]
     pub fn color_view(&self) -> wgpu::TextureView {
         let format = (self.color.format() == STORED_FORMAT).then_some(STORED_VIEW);
-        // A storage usage of the texture would not be legal for a view of another format, and the gather needs none.
+        // Not every usage of the texture is legal for a view of another format, and the gather needs one only.
         let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
         self.color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() })
     }
@@ -117,7 +118,8 @@ pub fn key_rows(ideal: &IdealGeometry) -> u32 {
 /// Pipelines of the ideal render.
 #[derive(Debug)]
 pub struct IdealPass {
-    resolve: ResolvePass,
+    marks: MarksPass,
+    near_marks: NearMarksPass,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
@@ -151,6 +153,8 @@ pub struct IdealSlot {
     chunks: wgpu::Buffer,
     /// Of the terrain's triangles; replaced by a larger one when a frame has more than any before.
     indices: wgpu::Buffer,
+    /// Those of them that are near marks.
+    kept: Kept,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     terrain_group: Option<wgpu::BindGroup>,
@@ -167,18 +171,18 @@ impl IdealPass {
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
         };
-        let both = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, both, wgpu::BufferBindingType::Uniform)]);
+        let every = wgpu::ShaderStages::VERTEX_FRAGMENT | wgpu::ShaderStages::COMPUTE;
+        let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, every, wgpu::BufferBindingType::Uniform)]);
+        let vertices = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
         let [texture, sampler] = texture_entries();
-        let terrain_layout = layout(
-            "camsim.ideal.terrain",
-            &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, storage), buffer_entry(3, wgpu::ShaderStages::VERTEX, storage)],
-        );
+        let terrain_layout =
+            layout("camsim.ideal.terrain", &[texture, sampler, buffer_entry(2, vertices, storage), buffer_entry(3, vertices, storage)]);
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         Ok(Self {
-            resolve: ResolvePass::new(gpu)?,
+            marks: MarksPass::new(gpu)?,
+            near_marks: NearMarksPass::new(gpu, &camera_layout, &terrain_layout)?,
             camera_layout,
             terrain_layout,
             mesh_layout,
@@ -222,6 +226,7 @@ impl IdealPass {
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
         let chunks = create("camsim.ideal.chunks", (chunks * size_of::<ChunkPlace>()) as u64, wgpu::BufferUsages::STORAGE);
         let indices = index_buffer(gpu, 0);
+        let kept = Kept::new(gpu, indices.size());
         let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
@@ -252,7 +257,7 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, chunks, indices, placements, camera_group, terrain_group, mesh_groups }
+        IdealSlot { camera, chunks, indices, kept, placements, camera_group, terrain_group, mesh_groups }
     }
 
     /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
@@ -279,8 +284,7 @@ impl IdealPass {
             }
         }
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
-        let (color_view, depth_view) = (view(color), view(depth));
+        let (color_view, depth_view) = (view(&target.color), view(&target.depth));
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
@@ -300,17 +304,28 @@ impl IdealPass {
                 middle_lod = lod;
             }
         }
-        let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), depth_attachment(&depth_view));
-        self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, &index_counts);
+        let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), Some(depth_attachment(&depth_view)));
+        self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
         drop(pass);
-        if let (Some(fine), Some(key)) = (&target.fine, fine) {
+        if let (Some(fine), Some(key), EdgeStage::Supersampled { thin, .. }) = (&target.fine, fine, plan.edges) {
+            if !thin {
+                self.marks.mark(gpu, recorder, plan, target, fine, false);
+                self.near_marks.encode(gpu, recorder, plan, target.allocated_px[0].div_ceil(TILE_PX), slots, &index_counts, fine);
+            }
             let depth_view = fine.depth_view();
             let color_view = fine.color.as_ref().map(view);
             let color = color_view.as_ref().map(|view| color_attachment(view, scene));
-            let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&depth_view));
-            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, &index_counts);
+            let mut pass = recorder.render_pass("ideal_fine", color, Some(depth_attachment(&depth_view)));
+            self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, |k| match (thin, index_counts[k]) {
+                (false, 1..) => Triangles::Kept,
+                (_, count) => Triangles::All(count),
+            });
             drop(pass);
-            self.resolve.encode(gpu, recorder, plan, target, fine);
+            if thin {
+                self.marks.mark(gpu, recorder, plan, target, fine, true);
+            }
+            self.marks.stamp(gpu, recorder, target, fine);
+            self.marks.borders(gpu, recorder, plan, target, fine);
         }
         Ok(middle_lod)
     }
@@ -324,16 +339,16 @@ impl IdealPass {
         scale: u32,
         buffers: &SceneBuffers,
         slots: &[IdealSlot],
-        index_counts: &[u32],
+        triangles: impl Fn(usize) -> Triangles,
     ) {
         let Some(pipelines) = self.pipelines.get(&key) else { return };
         let [width, height] = plan.ideal.size_px.map(|side| side * scale);
-        for ((slot, &indices), k) in slots.iter().zip(index_counts).zip(0..) {
-            let first_row = key_rows(&plan.ideal) * k * scale;
+        for (k, slot) in slots.iter().take(plan.keys.len()).enumerate() {
+            let first_row = key_rows(&plan.ideal) * k as u32 * scale;
             pass.set_viewport(0.0, first_row as f32, width as f32, height as f32, 0.0, 1.0);
             pass.set_scissor_rect(0, first_row, width, height);
             pass.set_bind_group(0, &slot.camera_group, &[]);
-            draw_terrain(pass, pipelines, slot, indices);
+            draw_terrain(pass, pipelines, slot, triangles(k));
             draw_meshes(pass, pipelines, slot, buffers);
         }
     }

@@ -49,7 +49,7 @@ pub struct FrameUniforms {
     pub pad3: u32,
 }
 
-/// Mirror of `IdealCamera` in shaders/ideal/surface.wgsl.
+/// Mirror of `IdealCamera` in shaders/ideal/camera.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]
@@ -65,6 +65,20 @@ pub struct IdealCamera {
     pub pad0: f32,
     pub pad1: f32,
     pub pad2: f32,
+}
+
+/// Mirror of `KeyLayout` in shaders/ideal/near_marks.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "documented in the shader, field by field")]
+pub struct KeyLayout {
+    pub ideal_size_px: [u32; 2],
+    pub first_row: u32,
+    pub tiles_across: u32,
+    pub index_count: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+    pub pad2: u32,
 }
 
 /// Mirror of `ChunkPlace` in shaders/ideal/terrain.wgsl.
@@ -185,5 +199,7 @@ mod tests {
             ]
         );
         assert_mirror!(&module, "ChunkPlace", ChunkPlace, [centre_from_base_m, first_vertex]);
+        let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
+        assert_mirror!(&module, "KeyLayout", KeyLayout, [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]);
     }
 }

@@ -2,8 +2,9 @@
 
 use crate::context::GpuContext;
 
-/// Passes of a frame: lens map and the map it starts from, ideal frame, resolve, reverse; and some to spare.
-const MAX_PASSES: u32 = 8;
+/// Passes of a frame: lens map and the map it starts from, ideal frame, marks, triangles near them, samples, stamp, borders, reverse, rays; and
+/// some to spare.
+const MAX_PASSES: u32 = 12;
 const STAMPS_BYTES: u64 = 16 * MAX_PASSES as u64;
 
 /// A pass and the milliseconds between its begin and its end.
@@ -99,12 +100,12 @@ impl<'a> Recorder<'a> {
         self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some(name), timestamp_writes })
     }
 
-    /// Begins a render pass that draws to a depth target and, if given, a colour target.
+    /// Begins a render pass.
     pub fn render_pass(
         &mut self,
         name: &'static str,
         color: Option<wgpu::RenderPassColorAttachment<'_>>,
-        depth: wgpu::RenderPassDepthStencilAttachment<'_>,
+        depth: Option<wgpu::RenderPassDepthStencilAttachment<'_>>,
     ) -> wgpu::RenderPass<'_> {
         let stamps = self.clock.as_mut().and_then(|clock| clock.next(name));
         let timestamp_writes = stamps.map(|(query_set, first)| wgpu::RenderPassTimestampWrites {
@@ -116,7 +117,7 @@ impl<'a> Recorder<'a> {
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(name),
             color_attachments: if colors[0].is_some() { &colors } else { &[] },
-            depth_stencil_attachment: Some(depth),
+            depth_stencil_attachment: depth,
             timestamp_writes,
             occlusion_query_set: None,
             multiview_mask: None,

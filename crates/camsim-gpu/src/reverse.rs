@@ -184,11 +184,10 @@ impl Variant {
             vec![(0, b.out_color.as_entire_binding())],
         ];
         let whole = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let fine = b.fine.map(|fine| {
-            (whole(fine.color.as_ref().unwrap_or(&fine.centre_depth)), fine.depth_view(), whole(&fine.lines), &fine.within_reach)
-        });
-        if let Some((centre, depth, lines, within_reach)) = &fine {
-            resources[1].extend([(5, view(centre)), (6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
+        let fine = b.fine.map(|fine| (fine.color.as_ref().map(whole), fine.depth_view(), whole(&fine.lines), &fine.within_reach));
+        if let Some((color, depth, lines, within_reach)) = &fine {
+            resources[1].extend(color.as_ref().map(|color| (5, view(color))));
+            resources[1].extend([(6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
@@ -221,11 +220,8 @@ fn layouts(key: PipelineKey, reads_list: bool) -> [Vec<wgpu::BindGroupLayoutEntr
     if key.edges != EdgeKind::None {
         let samples =
             |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: true };
+        ideal.extend((key.edges == EdgeKind::Samples).then(|| entry(5, samples(wgpu::TextureSampleType::Float { filterable: false }))));
         ideal.extend([
-            match key.edges {
-                EdgeKind::Samples => entry(5, samples(wgpu::TextureSampleType::Float { filterable: false })),
-                EdgeKind::None | EdgeKind::Centres => entry(5, texture(wgpu::TextureSampleType::Depth)),
-            },
             entry(6, samples(wgpu::TextureSampleType::Depth)),
             entry(7, texture(wgpu::TextureSampleType::Uint)),
             entry(8, storage(true)),
@@ -256,7 +252,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
     let linear_fog = plan.linear_fog.map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
     let (edge_scale, edge_samples) = match plan.edges {
         EdgeStage::None => (1, 0),
-        EdgeStage::Supersampled { scale, samples } => (scale, samples),
+        EdgeStage::Supersampled { scale, samples, .. } => (scale, samples),
     };
     FrameUniforms {
         size_px: plan.camera.size_px,

@@ -70,7 +70,7 @@ fn rays_through_several_keys_agree_with_their_twin() {
     let sequence = sequence(scenario, trajectory, scene);
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
     let plan = &done.plan;
-    let EdgeStage::Supersampled { scale, samples } = plan.edges else { panic!("{:?}", plan.edges) };
+    let EdgeStage::Supersampled { scale, samples, .. } = plan.edges else { panic!("{:?}", plan.edges) };
     assert_eq!(plan.keys.len(), 3);
     let images: Vec<_> = plan.keys.iter().map(|key| CastFrame::new(&sequence, plan, &key.pose, scale)).collect();
     let nearest_w = images.iter().map(CastFrame::nearest_w).fold(0.0, f64::max);

@@ -76,9 +76,18 @@ fn of_side(texel: vec2<i32>, first: i32, nearer: bool, between: f32) -> FineSamp
     return FineSample(texel, -1);
 }
 
-fn fine_inverse_depth(at_px: vec2<f32>) -> f32 {
-    let s = fine_sample(at_px);
-    return textureLoad(fine_depth, s.texel, s.index) / frame.near_m;
+fn is_marked(at_px: vec2<f32>) -> bool {
+    let at = clamp(at_px + 0.5, vec2<f32>(0.0), vec2<f32>(frame.ideal_size_px) - 1e-3);
+    return textureLoad(ideal_color, vec2<i32>(at) + vec2<i32>(0, key_row()), 0).a < 1.0;
+}
+
+// Of the surface that is seen at a place: its sample's in a marked pixel, which alone has samples; elsewhere one surface is around.
+fn surface_inverse_depth(at_px: vec2<f32>) -> f32 {
+    if (is_marked(at_px)) {
+        let s = fine_sample(at_px);
+        return textureLoad(fine_depth, s.texel, s.index) / frame.near_m;
+    }
+    return inverse_depth(at_px);
 }
 
 // Ray i of `frame.edge_samples`: place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
@@ -193,7 +202,7 @@ struct Look {
 
 fn look_at(uv: vec2<f32>, pose: Pose, w: f32) -> Look {
     let at_px = ideal_px_from_point(point_at(uv, pose, w));
-    return Look(at_px, line_inverse_depth(uv, pose, fine_inverse_depth(at_px)));
+    return Look(at_px, line_inverse_depth(uv, pose, surface_inverse_depth(at_px)));
 }
 
 // Where a ray first meets a surface of the ideal frame. The ray's points, from the nearest surface within reach to infinity, lie on a line of
@@ -211,7 +220,7 @@ fn first_surface(uv: vec2<f32>, pose: Pose) -> Met {
     let px_per_w = distance(near_px, far_px) / max(w_near, 1e-12);
     if (px_per_w * w_near < GAP_PX) {
         // Nothing hides: one step from the far end.
-        let there = look_at(uv, pose, line_inverse_depth(uv, pose, fine_inverse_depth(far_px)));
+        let there = look_at(uv, pose, line_inverse_depth(uv, pose, surface_inverse_depth(far_px)));
         return Met(there.at_px, there.found, true);
     }
     let looks = clamp(u32(ceil(px_per_w * w_near / LOOK_PX)), 1u, MAX_LOOKS);

@@ -4,7 +4,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::temporal::{
     IdealGeometry, InverseDepthImage, Source,
-    edges::{EDGE_STEP, steps},
+    marks::{EDGE_STEP, steps},
 };
 
 /// Side of a tile, texels.

@@ -84,10 +84,20 @@ impl FramePlan {
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
         passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}"));
-        if let EdgeStage::Supersampled { scale, .. } = self.edges {
+        if let EdgeStage::Supersampled { scale, thin, .. } = self.edges {
+            let marks = format!("{width}x{height} px, marked where several surfaces are seen");
             let color = if scale > 1 { "rgba16float + " } else { "" };
-            passes.push(format!("ideal_fine: {frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale));
-            passes.push(format!("resolve: {width}x{height} px of depth, silhouettes marked"));
+            let fine = format!("{frames}{}x{} px {color}depth32float, 4 samples each", width * scale, height * scale);
+            if thin {
+                passes.push(format!("ideal_fine: {fine}"));
+                passes.push(format!("marks: {marks}, by their samples too"));
+            } else {
+                passes.push(format!("marks: {marks}"));
+                passes.push("near_marks: triangles near marks".to_owned());
+                passes.push(format!("ideal_fine: {fine}, of those triangles"));
+            }
+            passes.push("stamp: marks into the alpha of the colour".to_owned());
+            passes.push("borders: lines within marked pixels; what lies within reach".to_owned());
         }
         let ray = match self.ray {
             RayStage::Pinhole => "pinhole ray",

@@ -136,7 +136,7 @@ mod tests {
     fn what_does_not_fit_is_left_out_and_said() {
         let ideal = IdealGeometry { size_px: [700, 500], focal_px: DVec2::ONE, principal_px: DVec2::ZERO };
         let made = |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), ideal);
-        let edges = EdgeStage::Supersampled { scale: 2, samples: 32 };
+        let edges = EdgeStage::Supersampled { scale: 2, samples: 32, thin: true };
         let count = |wanted, side| {
             let mut skipped = Vec::new();
             let found = fitting(wanted, edges, side, &mut skipped, made);

@@ -1,6 +1,6 @@
-//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the depth of the one sample of a supersampled
-//! ideal frame that it meets, and with the colour of that surface. f64 twin of `shaders/reverse/edges/supersampled.wgsl` and of the edge test in `shaders/ideal/resolve.wgsl`; borders within
-//! a pixel are [`super::lines`].
+//! Pixels that see a silhouette: rays of their own over the pixel's area and exposure, each with the depth of the one surface of the ideal frame
+//! that it meets, and with the colour of that surface. f64 twin of `shaders/reverse/edges/supersampled.wgsl`. Which pixels are marked is
+//! [`super::marks`]; borders within a pixel are [`super::lines`].
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -15,18 +15,6 @@ const MAX_LOOKS: f64 = 128.0;
 const HALVINGS: u32 = 5;
 /// A step of depth that moves a surface by less than this, in ideal pixels of parallax, hides nothing.
 const GAP_PX: f64 = 0.1;
-/// A step of depth, relative to the nearer surface, that a curved surface does not make within a pixel.
-pub const EDGE_STEP: f64 = 0.01;
-/// The same where the frame is drawn with more than one fine pixel a pixel: a wall's foot, where another picture begins, bends less.
-pub const FINE_EDGE_STEP: f64 = 0.003;
-
-/// Along one direction: a second difference of inverse depth beyond what a smooth surface has (a plane has none), or sky beside a surface.
-#[must_use]
-pub fn steps(before: f64, here: f64, after: f64, edge_step: f64) -> bool {
-    let high = before.max(here).max(after);
-    let low = before.min(here).min(after);
-    (before - 2.0 * here + after).abs() > edge_step * high || (low == 0.0 && high > 0.0)
-}
 
 /// Ray `i` of `count` (a power of two): place in the pixel, from -0.5 to 0.5 (Hammersley's points), and share of the exposure gone by.
 #[must_use]
@@ -206,7 +194,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use crate::temporal::fine::Centre;
+    use crate::temporal::{fine::Centre, marks::marks};
 
     const IDEAL: IdealGeometry = IdealGeometry { size_px: [80, 20], focal_px: DVec2::splat(60.0), principal_px: DVec2::new(39.5, 9.5) };
     const ROOF: f64 = 1.0 / 20.0;
@@ -224,6 +212,7 @@ mod tests {
         scale: u32,
         samples: Vec<f64>,
         centres: Vec<Centre>,
+        marks: Vec<bool>,
     }
 
     impl Drawn {
@@ -234,6 +223,7 @@ mod tests {
                 samples: &self.samples,
                 sample_colors: &[],
                 centres: &self.centres,
+                marks: &self.marks,
                 lines: &[],
             }
         }
@@ -243,11 +233,10 @@ mod tests {
         let corners = |[width, height]: [u32; 2]| (0..width * height).map(move |i| DVec2::new(f64::from(i % width), f64::from(i / width)));
         let fine = corners(IDEAL.size_px.map(|side| side * scale))
             .flat_map(|corner| FineImage::SAMPLE_PLACES.map(|place| (corner + place) / f64::from(scale) - 0.5));
-        Drawn {
-            scale,
-            samples: fine.map(|at_px| look(at_px).inverse_depth).collect(),
-            centres: corners(IDEAL.size_px).map(&look).collect(),
-        }
+        let samples: Vec<f64> = fine.map(|at_px| look(at_px).inverse_depth).collect();
+        let centres: Vec<Centre> = corners(IDEAL.size_px).map(&look).collect();
+        let marks = marks(IDEAL.size_px, scale, &centres, &samples);
+        Drawn { scale, samples, centres, marks }
     }
 
     #[test]
@@ -364,15 +353,6 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn planes_have_no_steps() {
-        assert!(!steps(0.001, 0.011, 0.021, EDGE_STEP) && !steps(0.0, 0.0, 0.0, EDGE_STEP));
-        assert!(steps(0.01, 0.01, 0.02, EDGE_STEP) && steps(0.0, 0.0, 0.01, EDGE_STEP) && steps(0.01, 0.01, 0.0, EDGE_STEP));
-        assert!(!steps(0.01, 0.01, 0.010_05, EDGE_STEP) && steps(0.01, 0.01, 0.010_05, FINE_EDGE_STEP));
-        // No depth is no step and no panic.
-        assert!(!steps(f64::NAN, f64::NAN, f64::NAN, EDGE_STEP));
     }
 
     #[test]

@@ -22,6 +22,13 @@ pub struct Centre {
     pub color: DVec3,
 }
 
+/// The first of the four pixels around a position, and how far the position is from it.
+#[derive(Clone, Copy, Debug)]
+struct Around {
+    base: DVec2,
+    t: DVec2,
+}
+
 /// An ideal frame whose depth is supersampled: `scale` fine pixels along a side of an ideal pixel, four samples each.
 #[derive(Clone, Copy, Debug)]
 pub struct FineImage<'a> {
@@ -36,6 +43,8 @@ pub struct FineImage<'a> {
     pub sample_colors: &'a [DVec3],
     /// Row-major ideal pixels.
     pub centres: &'a [Centre],
+    /// Pixels that, with their neighbours, show more than one surface: [`super::marks`].
+    pub marks: &'a [bool],
     /// Borders within fine pixels, as [`FineImage::lines_of`] finds them; empty for none.
     pub lines: &'a [Option<EdgeLine>],
 }
@@ -53,10 +62,31 @@ impl FineImage<'_> {
         (0..width * height).map(|i| edge_line([i % width, i / width], [width, height], &depth)).collect()
     }
 
-    /// Inverse depth (1/m) of the sample that stands for a position.
+    /// Inverse depth (1/m) of the surface that is seen at a position: its sample's in a marked pixel, elsewhere, where one surface is around,
+    /// bilinear between the pixels' middles.
     #[must_use]
     pub fn inverse_depth(&self, at_px: DVec2) -> f64 {
-        self.samples[self.sample(at_px)]
+        let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1e-3;
+        let pixel = (at_px + 0.5).clamp(DVec2::ZERO, last).floor();
+        if self.marks[pixel.y as usize * self.size_px[0] as usize + pixel.x as usize] {
+            return self.samples[self.sample(at_px)];
+        }
+        let around = self.around(at_px);
+        let [w00, w10, w01, w11] = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[x, y]| self.centre(&around, x, y).inverse_depth);
+        super::blend_inverse_depths([w00, w10, w01, w11], around.t)
+    }
+
+    /// The four pixels around a position; positions outside go to the border.
+    fn around(&self, at_px: DVec2) -> Around {
+        let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1.0;
+        let at = at_px.clamp(DVec2::ZERO, last);
+        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
+        Around { base, t: at - base }
+    }
+
+    fn centre(&self, around: &Around, x: i32, y: i32) -> Centre {
+        let at = |k: usize, step: i32| (around.base[k] + f64::from(step)).clamp(0.0, f64::from(self.size_px[k]) - 1.0);
+        self.centres[(at(1, y) * f64::from(self.size_px[0]) + at(0, x)) as usize]
     }
 
     /// The sample that stands for a position: the one of its quarter of the fine pixel; where a border of two surfaces runs through the fine
@@ -91,14 +121,10 @@ impl FineImage<'_> {
             return color;
         }
         let depth = self.inverse_depth(at_px);
-        let last = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1])) - 1.0;
-        let at = at_px.clamp(DVec2::ZERO, last);
-        let base = at.floor().min((last - 1.0).max(DVec2::ZERO));
-        let t = at - base;
-        let centre = |x: i32, y: i32| {
-            let [x, y] = [base.x + f64::from(x), base.y + f64::from(y)];
-            self.centres[(y.clamp(0.0, last.y) * (last.x + 1.0) + x.clamp(0.0, last.x)) as usize]
-        };
+        let around = self.around(at_px);
+        let (base, t) = (around.base, around.t);
+        let at = base + t;
+        let centre = |x, y| self.centre(&around, x, y);
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
         for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
             let Centre { inverse_depth: other, color } = centre(x, y);

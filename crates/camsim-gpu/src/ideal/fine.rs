@@ -1,46 +1,42 @@
-//! Supersampled ideal frames: their textures, and the pass that resolves them to one colour and depth a pixel.
+//! Textures and buffers of ideal frames in which silhouettes can be seen.
 
-use camsim_core::plan::{EdgeStage, FramePlan};
+use camsim_core::plan::EdgeStage;
 
-use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW, key_rows};
-use crate::{
-    context::GpuContext,
-    recorder::Recorder,
-    shaders::{self, ComposeError},
-};
+use super::{COLOR_FORMAT, DEPTH_FORMAT, STORED_FORMAT, STORED_VIEW, marks::LINES_FORMAT};
+use crate::context::GpuContext;
 
 /// Samples of a fine pixel; every adapter has 4, at the standard places.
 pub const FINE_SAMPLES: u32 = 4;
-/// A packed normal and offset, and the depth value between the surfaces.
-const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
-/// Edge of the square workgroups, and of the tiles.
-const WORKGROUP_PX: u32 = 8;
-/// Tiles that a workgroup of `shaders/ideal/reach.wgsl` takes.
-const REACH_WORKGROUP: u32 = 64;
+/// Edge of the square tiles that marks are listed by, pixels.
+pub(super) const TILE_PX: u32 = 8;
+/// Arguments of a draw and of a dispatch, before the list of marked tiles.
+pub(super) const MARKED_HEAD_BYTES: u64 = 32;
+/// A marked tile's place and its 64 bits.
+const MARKED_TILE_BYTES: u64 = 12;
 
-/// Textures that a supersampled ideal frame is drawn to.
+/// What a frame with silhouettes has besides colour and depth at the middle of each pixel.
 #[derive(Debug)]
 pub struct FineTarget {
     /// Fine pixels along a side of an ideal pixel.
     pub scale: u32,
-    /// near / z, 4 samples a fine pixel.
+    /// near / z, 4 samples a fine pixel; where surfaces are not thin, near marked pixels only.
     pub depth: wgpu::Texture,
     /// Linear colour, 4 samples a fine pixel, where there is more than one a pixel: what is thinner than a pixel then has its own.
     pub color: Option<wgpu::Texture>,
-    /// Linear colour at the middle of each ideal pixel.
-    pub centre_color: wgpu::Texture,
-    /// near / z there.
-    pub centre_depth: wgpu::Texture,
     /// Borders of two surfaces within fine pixels: `shaders/ideal/lines.wgsl`.
     pub lines: wgpu::Texture,
-    /// A word for each 8x8 ideal pixels of the target, see `shaders/ideal/reach.wgsl`.
+    /// A word for each tile of the target, see `shaders/ideal/reach.wgsl`.
     pub within_reach: wgpu::Buffer,
     /// The same half done.
-    within_rows: wgpu::Buffer,
-    /// Four u32: width and height of an ideal frame, and the rows from one to the next, for the resolve pass.
-    layout: wgpu::Buffer,
+    pub(super) within_rows: wgpu::Buffer,
+    /// The tiles that have marks: `shaders/ideal/marked_tiles.wgsl`.
+    pub(super) marked: wgpu::Buffer,
+    /// Four u32: width and height of an ideal frame, rows from one to the next, `scale`.
+    pub(super) layout: wgpu::Buffer,
     /// Four u32: tiles across and down, and the reach in tiles.
-    tile_layout: wgpu::Buffer,
+    pub(super) tile_layout: wgpu::Buffer,
+    /// Four f32: width and height of the target.
+    pub(super) target_px: wgpu::Buffer,
 }
 
 /// Fine pixels along a side of an ideal pixel, for frames that need any.
@@ -74,7 +70,7 @@ pub(super) fn texture(
 impl FineTarget {
     pub(super) fn new(gpu: &GpuContext, ideal_px: [u32; 2], scale: u32) -> Self {
         let size_px = ideal_px.map(|side| side * scale);
-        let tiles = ideal_px.map(|side| u64::from(side.div_ceil(WORKGROUP_PX)));
+        let [across, down] = ideal_px.map(|side| u64::from(side.div_ceil(TILE_PX)));
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
         let buffer = |label, size, usage| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
@@ -84,15 +80,19 @@ impl FineTarget {
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
         Self {
             scale,
-            lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
-            layout: buffer("camsim.ideal.layout", 16, uniform),
-            tile_layout: buffer("camsim.ideal.tile_layout", 16, uniform),
-            within_reach: buffer("camsim.ideal.within_reach", 4 * tiles[0] * tiles[1], storage),
-            within_rows: buffer("camsim.ideal.within_rows", 4 * tiles[0] * tiles[1], storage),
             depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
             color: (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage)),
-            centre_color: texture(gpu, "camsim.ideal.centre_color", ideal_px, COLOR_FORMAT, 1, usage),
-            centre_depth: texture(gpu, "camsim.ideal.centre_depth", ideal_px, DEPTH_FORMAT, 1, usage),
+            lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
+            within_reach: buffer("camsim.ideal.within_reach", 4 * across * down, storage),
+            within_rows: buffer("camsim.ideal.within_rows", 4 * across * down, storage),
+            marked: buffer(
+                "camsim.ideal.marked",
+                MARKED_HEAD_BYTES + MARKED_TILE_BYTES * across * down,
+                storage | wgpu::BufferUsages::INDIRECT,
+            ),
+            layout: buffer("camsim.ideal.layout", 16, uniform),
+            tile_layout: buffer("camsim.ideal.tile_layout", 16, uniform),
+            target_px: buffer("camsim.ideal.target_px", 16, uniform),
         }
     }
 
@@ -101,120 +101,4 @@ impl FineTarget {
     pub fn depth_view(&self) -> wgpu::TextureView {
         self.depth.create_view(&wgpu::TextureViewDescriptor::default())
     }
-}
-
-/// Samples to pixels, the mark of silhouettes, and what lies within reach of each place.
-#[derive(Debug)]
-pub(super) struct ResolvePass {
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
-    reach_layout: wgpu::BindGroupLayout,
-    reach: [wgpu::ComputePipeline; 2],
-}
-
-impl ResolvePass {
-    pub(super) fn new(gpu: &GpuContext) -> Result<Self, ComposeError> {
-        let device = &gpu.device;
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
-        let view_dimension = wgpu::TextureViewDimension::D2;
-        let read = |sample_type, multisampled| wgpu::BindingType::Texture { sample_type, view_dimension, multisampled };
-        let write = |format| wgpu::BindingType::StorageTexture { access: wgpu::StorageTextureAccess::WriteOnly, format, view_dimension };
-        let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
-        let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
-        let group = |entries: &[wgpu::BindGroupLayoutEntry]| {
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.resolve"), entries })
-        };
-        let layout = group(&[
-            entry(0, read(wgpu::TextureSampleType::Depth, true)),
-            entry(1, read(wgpu::TextureSampleType::Float { filterable: false }, false)),
-            entry(2, write(COLOR_FORMAT)),
-            entry(3, write(wgpu::TextureFormat::R32Float)),
-            entry(4, storage(false)),
-            entry(5, buffer(wgpu::BufferBindingType::Uniform)),
-            entry(6, write(LINES_FORMAT)),
-        ]);
-        let reach_layout = group(&[entry(0, storage(true)), entry(1, storage(false)), entry(2, buffer(wgpu::BufferBindingType::Uniform))]);
-        let pipeline = |file, entry_point, layout| -> Result<_, ComposeError> {
-            let module = shaders::module(device, file, file, &[])?;
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some(file),
-                bind_group_layouts: &[Some(layout)],
-                immediate_size: 0,
-            });
-            Ok(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(file),
-                layout: Some(&layout),
-                module: &module,
-                entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                cache: None,
-            }))
-        };
-        Ok(Self {
-            pipeline: pipeline("ideal/resolve.wgsl", "resolve", &layout)?,
-            reach: [
-                pipeline("ideal/reach.wgsl", "along_rows", &reach_layout)?,
-                pipeline("ideal/reach.wgsl", "along_columns", &reach_layout)?,
-            ],
-            layout,
-            reach_layout,
-        })
-    }
-
-    /// Records the resolve of a plan's ideal frames.
-    pub(super) fn encode(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, target: &IdealTarget, fine: &FineTarget) {
-        let (rows, last) = (key_rows(&plan.ideal), plan.keys.len() as u32 - 1);
-        let size_px = [plan.ideal.size_px[0], rows * last + plan.ideal.size_px[1]];
-        let layout = [plan.ideal.size_px[0], plan.ideal.size_px[1], rows, 0];
-        gpu.queue.write_buffer(&fine.layout, 0, bytemuck::cast_slice(&layout));
-        let [across, down] = target.allocated_px.map(|side| side.div_ceil(WORKGROUP_PX));
-        let reach = plan.mark_reach_px().div_ceil(WORKGROUP_PX).min(across.max(down));
-        gpu.queue.write_buffer(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
-        // What the frame does not cover has nothing.
-        recorder.encoder().clear_buffer(&fine.within_reach, 0, None);
-        let [group, along_rows, along_columns] = self.bind(gpu, target, fine);
-        let mut pass = recorder.compute_pass("resolve");
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
-        for (pipeline, group) in self.reach.iter().zip([along_rows, along_columns]) {
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
-            pass.dispatch_workgroups((across * down).div_ceil(REACH_WORKGROUP), 1, 1);
-        }
-    }
-
-    fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &FineTarget) -> [wgpu::BindGroup; 3] {
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (depth_samples, drawn, color, depth) = (fine.depth_view(), view(&fine.centre_color), view(&target.color), view(&target.depth));
-        let lines = view(&fine.lines);
-        let bind = |layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry<'_>]| {
-            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.resolve"), layout, entries })
-        };
-        let reach = |from: &wgpu::Buffer, to: &wgpu::Buffer| {
-            let entries =
-                [entry(0, from.as_entire_binding()), entry(1, to.as_entire_binding()), entry(2, fine.tile_layout.as_entire_binding())];
-            bind(&self.reach_layout, &entries)
-        };
-        [
-            bind(
-                &self.layout,
-                &[
-                    entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
-                    entry(1, wgpu::BindingResource::TextureView(&drawn)),
-                    entry(2, wgpu::BindingResource::TextureView(&color)),
-                    entry(3, wgpu::BindingResource::TextureView(&depth)),
-                    entry(4, fine.within_reach.as_entire_binding()),
-                    entry(5, fine.layout.as_entire_binding()),
-                    entry(6, wgpu::BindingResource::TextureView(&lines)),
-                ],
-            ),
-            reach(&fine.within_reach, &fine.within_rows),
-            reach(&fine.within_rows, &fine.within_reach),
-        ]
-    }
-}
-
-fn entry(binding: u32, resource: wgpu::BindingResource<'_>) -> wgpu::BindGroupEntry<'_> {
-    wgpu::BindGroupEntry { binding, resource }
 }

@@ -3,7 +3,7 @@
 use camsim_core::scene::{Terrain, TerrainMesh};
 use glam::DVec3;
 
-use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines};
+use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines, near_marks::Kept};
 use crate::{context::GpuContext, layout::ChunkPlace, upload::SceneBuffers};
 
 /// Room for the indices of a few thousand triangles, bytes.
@@ -41,18 +41,37 @@ pub(super) fn place_terrain(gpu: &GpuContext, slot: &mut IdealSlot, terrain: &Te
     let bytes: &[u8] = bytemuck::cast_slice(&mesh.indices);
     if slot.indices.size() < bytes.len() as u64 {
         slot.indices = index_buffer(gpu, bytes.len() as u64);
+        slot.kept = Kept::new(gpu, slot.indices.size());
     }
     gpu.queue.write_buffer(&slot.indices, 0, bytes);
     mesh.indices.len() as u32
 }
 
+/// Which of a key's triangles are drawn.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Triangles {
+    /// All, of so many indices.
+    All(u32),
+    /// Those near marks.
+    Kept,
+}
+
 /// Draws a terrain's triangles, all at once.
-pub(super) fn draw_terrain(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, indices: u32) {
-    let Some(group) = slot.terrain_group.as_ref().filter(|_| indices > 0) else { return };
+pub(super) fn draw_terrain(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, triangles: Triangles) {
+    let Some(group) = slot.terrain_group.as_ref() else { return };
     pass.set_pipeline(&pipelines.terrain);
     pass.set_bind_group(1, group, &[]);
-    pass.set_index_buffer(slot.indices.slice(..), wgpu::IndexFormat::Uint32);
-    pass.draw_indexed(0..indices, 0, 0..1);
+    match triangles {
+        Triangles::All(0) => {}
+        Triangles::All(count) => {
+            pass.set_index_buffer(slot.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..count, 0, 0..1);
+        }
+        Triangles::Kept => {
+            pass.set_index_buffer(slot.kept.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed_indirect(&slot.kept.arguments, 0);
+        }
+    }
 }
 
 /// For at least so many bytes: a power of two, so that few frames need another.
@@ -60,7 +79,7 @@ pub(super) fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("camsim.ideal.indices"),
         size: bytes.next_power_of_two().max(MIN_INDEX_BYTES),
-        usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+        usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }

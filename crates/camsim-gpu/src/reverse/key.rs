@@ -239,8 +239,13 @@ mod tests {
             SurfaceReads::ALL
                 .map(|reads| (format!("{file} {reads:?}"), shaders::compose(file, &[crate::ideal::reads_slot(reads)]).unwrap()))
         });
-        let resolve = ["ideal/resolve.wgsl", "ideal/reach.wgsl"].map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
-        for (name, text) in texts.chain(surfaces).chain(resolve) {
+        let marks = [false, true].map(|thin| {
+            let slot = crate::ideal::spread_slot(thin);
+            (format!("ideal/marks.wgsl {thin}"), shaders::compose("ideal/marks.wgsl", &[slot]).unwrap())
+        });
+        let others = ["ideal/near_marks.wgsl", "ideal/stamp.wgsl", "ideal/borders.wgsl", "ideal/reach.wgsl"];
+        let others = others.map(|file| (file.to_owned(), shaders::compose(file, &[]).unwrap()));
+        for (name, text) in texts.chain(surfaces).chain(marks).chain(others) {
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));

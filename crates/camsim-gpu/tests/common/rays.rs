@@ -13,6 +13,7 @@ use camsim_core::{
     temporal::{
         fine::{Centre, FineImage},
         lines::EdgeLine,
+        marks::marks,
     },
 };
 use glam::{DVec2, DVec3};
@@ -129,6 +130,7 @@ pub struct CastFrame {
     pub sample_colors: Vec<DVec3>,
     pub centres: Vec<Centre>,
     pub lines: Vec<Option<EdgeLine>>,
+    pub marks: Vec<bool>,
 }
 
 impl CastFrame {
@@ -144,14 +146,15 @@ impl CastFrame {
         // The renderer keeps colours of samples only where they are many.
         let sample_colors = if scale > 1 { samples.iter().map(|sample| sample.color).collect() } else { Vec::new() };
         let samples: Vec<f64> = samples.iter().map(|sample| sample.inverse_depth).collect();
-        let centres = corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
+        let centres: Vec<Centre> = corners(size_px).map(|at_px| look(sequence, plan, key, at_px)).collect();
+        let marks = marks(size_px, scale, &centres, &samples);
         let lines = FineImage::lines_of(size_px, scale, &samples);
-        Self { size_px, scale, samples, sample_colors, centres, lines }
+        Self { size_px, scale, samples, sample_colors, centres, lines, marks }
     }
 
     pub fn image(&self) -> FineImage<'_> {
-        let Self { size_px, scale, samples, sample_colors, centres, lines } = self;
-        FineImage { size_px: *size_px, scale: *scale, samples, sample_colors, centres, lines }
+        let Self { size_px, scale, samples, sample_colors, centres, lines, marks } = self;
+        FineImage { size_px: *size_px, scale: *scale, samples, sample_colors, centres, lines, marks }
     }
 
     pub fn nearest_w(&self) -> f64 {

@@ -1,0 +1,12 @@
+// Tiles of 8x8 pixels that have marks, as later passes read them; ideal/marks.wgsl fills the list.
+
+struct MarkedTile {
+    // Column, and row << 16, of the tile.
+    place: u32,
+    // A bit for each pixel of it, row by row from the lowest.
+    bits_low: u32,
+    bits_high: u32,
+}
+
+// Workgroups along x at most: every adapter has 65535 along each axis.
+const MOST_GROUPS: u32 = 32768u;
