@@ -45,7 +45,7 @@ pub use error::Predicted;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
-pub use stages::{BlurStage, RayStage, SurfaceReads, TemporalStage};
+pub use stages::{BlurStage, NodeDepths, RayStage, SurfaceReads, TemporalStage};
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;

@@ -6,6 +6,8 @@
 use glam::{DMat3, DVec2, DVec3};
 use serde::Serialize;
 
+use crate::plan::NodeDepths;
+
 pub mod displacement;
 pub mod edges;
 pub mod fine;
@@ -120,19 +122,39 @@ pub fn reproject(
     depth: &InverseDepthImage<'_>,
     ideal: &IdealGeometry,
 ) -> Option<Source> {
-    source_at(uv, key_from_line, settle(uv, key_from_line, iterations, depth, ideal).on_line, ideal)
+    source_at(uv, key_from_line, settle(uv, key_from_line, 0.0, iterations, depth, ideal).on_line, ideal)
 }
 
-/// The key frame's inverse depth that the last of `iterations` look-ups of [`reproject`] finds, 1/m.
+/// Sources at the nodes of an exposure, whose poses relative to the key are `nodes`, in order of time; `mid` is that of mid-exposure.
 #[must_use]
-pub fn settled_inverse_depth(
+pub fn reproject_nodes(
     uv: DVec2,
-    key_from_line: (DMat3, DVec3),
+    nodes: &[(DMat3, DVec3)],
+    mid: (DMat3, DVec3),
+    depths: NodeDepths,
     iterations: u32,
     depth: &InverseDepthImage<'_>,
     ideal: &IdealGeometry,
-) -> f64 {
-    settle(uv, key_from_line, iterations, depth, ideal).in_key
+) -> Vec<Option<Source>> {
+    let looked_up = |pose, guess, iterations| settle(uv, pose, guess, iterations, depth, ideal).in_key;
+    let (Some(&begin), Some(&end)) = (nodes.first(), nodes.last()) else { return Vec::new() };
+    let first = looked_up(begin, 0.0, iterations);
+    let begun_with = |pose, guess| looked_up(pose, guess, iterations.max(2) - 1);
+    let found: Vec<f64> = match depths {
+        NodeDepths::Mid => vec![looked_up(mid, 0.0, iterations); nodes.len()],
+        NodeDepths::Ends => {
+            let step = (begun_with(end, first) - first) / (nodes.len() - 1).max(1) as f64;
+            (0..nodes.len()).map(|node| first + node as f64 * step).collect()
+        }
+        NodeDepths::Each => {
+            let next = |before: &mut f64, &pose: &(DMat3, DVec3)| {
+                *before = begun_with(pose, *before);
+                Some(*before)
+            };
+            std::iter::once(first).chain(nodes[1..].iter().scan(first, next)).collect()
+        }
+    };
+    nodes.iter().zip(found).map(|(&pose, found)| reproject_with(uv, pose, found, ideal)).collect()
 }
 
 /// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of [`reproject`].
@@ -144,16 +166,24 @@ pub fn reproject_with(uv: DVec2, key_from_line: (DMat3, DVec3), found: f64, idea
 }
 
 /// Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's ray.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Settled {
     in_key: f64,
     on_line: f64,
 }
 
-fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, depth: &InverseDepthImage<'_>, ideal: &IdealGeometry) -> Settled {
+/// `guess`: what the key frame is taken to have there at first, 1/m.
+fn settle(
+    uv: DVec2,
+    key_from_line: (DMat3, DVec3),
+    guess: f64,
+    iterations: u32,
+    depth: &InverseDepthImage<'_>,
+    ideal: &IdealGeometry,
+) -> Settled {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
-    let mut settled = Settled::default();
+    let mut settled = Settled { in_key: guess, on_line: depth_on_line(direction, shift, guess).unwrap_or(0.0) };
     for _ in 0..iterations {
         let in_key = depth.inverse_depth(ideal.px_from_point(direction + settled.on_line * shift));
         settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };

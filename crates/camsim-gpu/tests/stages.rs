@@ -7,11 +7,11 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     noise::tail_table,
     photometric::{photometric, vignette_weights},
-    plan::{RayStage, TemporalStage, line_poses},
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, ZoomSpec},
+    plan::{NodeDepths, RayStage, TemporalStage, line_poses},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, ZoomSpec},
     sequence::{GrayImage, Sequence},
     temporal::{
-        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage, gather, reproject, reproject_with, settled_inverse_depth,
+        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage, gather, reproject, reproject_nodes, reproject_with,
     },
 };
 use common::{engine, pattern, render, scenario, sequence, steady};
@@ -81,7 +81,16 @@ fn footprint(map: &[[f32; 2]], size_px: [u32; 2], [x, y]: [u32; 2], ideal: &Idea
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn temporal_inverse_and_gather_agree_with_their_twins() {
-    let sequence = sequence(moving_scenario(), steady(120.0, 30.0, EAST, TURN), pattern(6000.0));
+    // Tolerances that ask for depth at mid-exposure, at its ends and in each node.
+    let depths = [0.5, 0.001, 1e-5].map(gather_as_its_twin);
+    assert_eq!(depths, NodeDepths::ALL);
+}
+
+fn gather_as_its_twin(max_error_px: f64) -> NodeDepths {
+    let mut scenario = moving_scenario();
+    scenario.quality.max_error_px = max_error_px;
+    scenario.quality.solver = Auto::Value(Solver::Reproject);
+    let sequence = sequence(scenario, steady(120.0, 30.0, EAST, TURN), pattern(6000.0));
     let (done, ideal) = render_with_ideal(&sequence, &[Channel::Color, Channel::Coords, Channel::Depth]);
     let plan = &done.plan;
     let blur = plan.blur.expect("30 ms at 60 m/s blurs");
@@ -111,9 +120,9 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             }
             worst_px = worst_px.max(at_px.distance(DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]))));
             worst_depth = worst_depth.max((f64::from(depths[i]) * inverse_depth - 1.0).abs());
-            let found = settled_inverse_depth(uv, entry(blur.nodes), iterations, &depth, &ideal.geometry);
-            let of_node = |node| if blur.one_depth { reproject_with(uv, entry(node), found, &ideal.geometry) } else { solve(node) };
-            let Some(nodes) = (0..blur.nodes).map(|node| of_node(node).map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
+            let poses: Vec<_> = (0..blur.nodes).map(entry).collect();
+            let nodes = reproject_nodes(uv, &poses, entry(blur.nodes), blur.depths, iterations, &depth, &ideal.geometry);
+            let Some(nodes) = nodes.into_iter().map(|node| node.map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
             let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.taps);
             let expected = gather(&nodes, &area, &color, blur.samples_per_px, blur.max_samples);
             let found = DVec3::new(
@@ -127,11 +136,15 @@ fn temporal_inverse_and_gather_agree_with_their_twins() {
             assert!((found - expected).abs().max_element() < 0.02, "({x}, {y}): {found} {expected}");
         }
     }
-    eprintln!("temporal: {worst_px:.2e} px, depth {worst_depth:.2e}; gather: {differing} of {compared} pixels beyond 1e-3");
+    eprintln!(
+        "{:?}, {} nodes: temporal {worst_px:.2e} px, depth {worst_depth:.2e}; gather: {differing} of {compared} pixels beyond 1e-3",
+        blur.depths, blur.nodes
+    );
     assert!(compared > 20_000, "{compared}");
     // f32 of coordinates up to 400 px: 3e-5 px a rounding.
     assert!(worst_px < 5e-4 && worst_depth < 1e-4, "{worst_px:.2e} {worst_depth:.2e}");
     assert!(differing * 100 < compared, "{differing} of {compared}");
+    blur.depths
 }
 
 #[test]

@@ -1,5 +1,6 @@
 // Exposure: mean over the true path of the source, in linear light (paper eq. 20 without its straight line).
-// Nodes are solved for themselves (the `nodes` slot says with what depth); between two nodes the path is straight and sampled at uniform midpoints, as many as its length asks for.
+// Nodes are solved one after the other (the `nodes` slot says with what depth); between two nodes the path is straight and sampled at uniform
+// midpoints, as many as its length asks for.
 // Twin: camsim_core::temporal::gather.
 #import reverse/gather/footprint.wgsl
 #import <slot:nodes>
@@ -17,10 +18,9 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     var sum = vec4<f32>(0.0);
     var inside = true;
     var tap = 0u;
-    let depth = exposure_depth(pixel, ray);
-    var source = node_source(pixel, ray, 0u, depth);
+    var source = first_node(pixel, ray);
     for (var k = 0u; k < segments; k++) {
-        let next = node_source(pixel, ray, k + 1u, depth);
+        let next = next_node(pixel, ray, k + 1u);
         inside = inside && source.inside && next.inside;
         let count = samples_for(distance(source.at_px, next.at_px), at_least);
         var part = vec4<f32>(0.0);
@@ -42,9 +42,12 @@ fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
     }
     let along = clamp(phase + 0.5, 0.0, 1.0) * f32(frame.nodes - 1u);
     let k = min(u32(along), frame.nodes - 2u);
-    let depth = exposure_depth(pixel, ray);
-    let a = node_source(pixel, ray, k, depth);
-    let b = node_source(pixel, ray, k + 1u, depth);
+    var a = first_node(pixel, ray);
+    var b = a;
+    for (var node = 1u; node <= k + 1u; node++) {
+        a = b;
+        b = next_node(pixel, ray, node);
+    }
     var source = a;
     source.at_px = mix(a.at_px, b.at_px, along - f32(k));
     source.inside = a.inside && b.inside;

@@ -12,9 +12,10 @@ struct Settled {
     on_line: f32,
 }
 
-fn settle(direction: vec3<f32>, shift: vec3<f32>) -> Settled {
-    var settled = Settled(0.0, 0.0);
-    for (var i = 0u; i < frame.iterations; i++) {
+// `guess`: what the key frame is taken to have there at first, 1/m.
+fn settle(direction: vec3<f32>, shift: vec3<f32>, guess: f32, iterations: u32) -> Settled {
+    var settled = Settled(guess, depth_on_line(direction, shift, guess, 0.0));
+    for (var i = 0u; i < iterations; i++) {
         settled.in_key = inverse_depth(ideal_px_from_point(direction + settled.on_line * shift));
         settled.on_line = depth_on_line(direction, shift, settled.in_key, settled.on_line);
     }
@@ -24,7 +25,7 @@ fn settle(direction: vec3<f32>, shift: vec3<f32>) -> Settled {
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let direction = rotate(pose, vec3<f32>(uv, 1.0));
     let shift = translation(pose);
-    return source_at(direction, shift, settle(direction, shift).on_line);
+    return source_at(direction, shift, settle(direction, shift, 0.0, frame.iterations).on_line);
 }
 
 // The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or behind the line's own image plane the
@@ -40,9 +41,9 @@ fn source_at(direction: vec3<f32>, shift: vec3<f32>, w: f32) -> Source {
     return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px));
 }
 
-// The key frame's inverse depth that the last look-up of the temporal inverse finds.
-fn settled_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
-    return settle(rotate(pose, vec3<f32>(uv, 1.0)), translation(pose)).in_key;
+// The key frame's inverse depth that the last of some look-ups finds, the first of which takes it to be `guess`, 1/m.
+fn settled_inverse_depth(uv: vec2<f32>, pose: Pose, guess: f32, iterations: u32) -> f32 {
+    return settle(rotate(pose, vec3<f32>(uv, 1.0)), translation(pose), guess, iterations).in_key;
 }
 
 // Where a surface of this inverse depth in the key frame is seen.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, FramePlan, Motion, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
+use super::{BlurStage, EdgeStage, FramePlan, Motion, NodeDepths, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
 use crate::{
     scenario::Preset,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
@@ -115,7 +115,11 @@ impl FramePlan {
             None => "sharp".to_owned(),
             Some(blur) if self.preset == Preset::Paper => format!("straight blur of {} samples, ends included", blur.max_samples),
             Some(blur) => {
-                let depth = if blur.one_depth { " of one depth" } else { "" };
+                let depth = match (self.temporal, blur.depths) {
+                    (TemporalStage::Reproject { .. }, NodeDepths::Mid) => " of one depth",
+                    (TemporalStage::Reproject { .. }, NodeDepths::Ends) => " with depth of both ends",
+                    _ => "",
+                };
                 format!("blur with {} nodes{depth}, {:.2} samples a px", blur.nodes, blur.samples_per_px)
             }
         };

@@ -45,6 +45,8 @@ pub(super) struct Trial<'a> {
 pub(super) struct Truth {
     /// Instant, path time.
     pub t_s: f64,
+    /// Share of the exposure gone by.
+    share: f64,
     /// Source.
     pub at_px: DVec2,
     /// Inverse planar depth in the line's camera, 1/m.
@@ -67,7 +69,9 @@ pub(super) struct Outcome {
     pub after: [f64; MAX_LOOK_UPS + 1],
     /// With the depth that n look-ups find at mid-exposure.
     pub of_mid: [f64; MAX_LOOK_UPS + 1],
-    /// The part of it that more look-ups would mend.
+    /// After n look-ups, or n - 1 and at least one where they begin with the depth that the other end of the exposure finds.
+    pub handed_on: [f64; MAX_LOOK_UPS + 1],
+    /// The part of `after` that more look-ups would mend.
     pub unsettled: [f64; MAX_LOOK_UPS + 1],
     /// Equation 16 and equation 18.
     pub linear_px: f64,
@@ -100,6 +104,7 @@ impl Trial<'_> {
         }
         Some(Truth {
             t_s,
+            share: phase + 0.5,
             at_px,
             inverse_depth,
             key_inverse_depth: inverse_depth / point.z,
@@ -117,8 +122,11 @@ impl Trial<'_> {
         let mut outcome =
             Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
         let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16) };
-        let places = settle(probe.uv, truth.in_key, self.ideal, &mut depth);
+        let places = settle(probe.uv, truth.in_key, 0.0, self.ideal, &mut depth);
         outcome.after = places.map(off);
+        let elsewhere = self.key_inverse_depth(probe, if truth.share > 0.5 { 0.0 } else { 1.0 });
+        let begun_there = settle(probe.uv, truth.in_key, elsewhere, self.ideal, &mut depth).map(off);
+        outcome.handed_on = std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after[n]));
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
         outcome.of_mid = self.with_depth_of_mid(probe, truth, &mut depth).map_or(outcome.after, |places| places.map(off));
@@ -139,12 +147,30 @@ impl Trial<'_> {
         if truth.t_s == mid_s {
             return None;
         }
-        let looked_at = settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), self.ideal, depth);
+        let looked_at = settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), 0.0, self.ideal, depth);
         let (direction, shift) = (truth.direction, truth.in_key.1);
         Some(std::array::from_fn(|n| {
             let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
             self.ideal.px_from_point(direction + w.unwrap_or(0.0) * shift)
         }))
+    }
+
+    /// The key frame's inverse depth of what a probe's ray meets at a share of the exposure, 1/m; 0 = sky.
+    fn key_inverse_depth(&self, probe: &Probe, share: f64) -> f64 {
+        let pose = self.path.pose(self.instant_s(probe, share));
+        let met = self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
+        let inverse_depth = met.map_or(0.0, |met| 1.0 / met.depth_m);
+        let (rotation, shift) = pose.relative_to(self.key_pose);
+        let z = (rotation * probe.uv.extend(1.0) + inverse_depth * shift).z;
+        if z > 0.0 { inverse_depth / z } else { 0.0 }
+    }
+
+    /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends.
+    pub fn between_ends_px(&self, probe: &Probe, truth: &Truth) -> f64 {
+        let [first, last] = [0.0, 1.0].map(|share| self.key_inverse_depth(probe, share));
+        let (direction, shift) = (truth.direction, truth.in_key.1);
+        let w = depth_on_line(direction, shift, first + (last - first) * truth.share).unwrap_or(0.0);
+        self.ideal.px_from_point(direction + w * shift).distance(truth.at_px)
     }
 
     /// Instant at a share of the exposure, 0 to 1.
@@ -218,11 +244,18 @@ impl Truth {
     }
 }
 
-/// The places looked at: after no look-up, after one and so on. The same steps as [`crate::temporal::reproject`].
-fn settle(uv: DVec2, (rotation, shift): (DMat3, DVec3), ideal: &IdealGeometry, depth: &mut KeyDepth<'_>) -> [DVec2; MAX_LOOK_UPS + 1] {
+/// The places looked at: after no look-up, after one and so on, the first of which takes the key's inverse depth to be `guess`. The same
+/// steps as [`crate::temporal::reproject`].
+fn settle(
+    uv: DVec2,
+    (rotation, shift): (DMat3, DVec3),
+    guess: f64,
+    ideal: &IdealGeometry,
+    depth: &mut KeyDepth<'_>,
+) -> [DVec2; MAX_LOOK_UPS + 1] {
     let direction = rotation * uv.extend(1.0);
-    let mut w = 0.0;
-    let mut at_px = ideal.px_from_point(direction);
+    let mut w = depth_on_line(direction, shift, guess).unwrap_or(0.0);
+    let mut at_px = ideal.px_from_point(direction + w * shift);
     let mut last_px = DVec2::INFINITY;
     std::array::from_fn(|n| {
         // A place that gives itself again will do so for ever.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    BlurStage, EdgeStage, LensReach, Motion, RayStage, TemporalStage,
+    BlurStage, EdgeStage, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     levels::Expected,
     probes::Probe,
@@ -162,12 +162,16 @@ impl Case<'_> {
                 ways.push(with(TemporalStage::Rk2));
             }
         }
-        let look_ups = |one_depth: bool| {
-            let blur = self.blur.map(|blur| BlurStage { one_depth, ..blur });
+        let look_ups = |depths: NodeDepths| {
+            let blur = self.blur.map(|blur| BlurStage { depths, ..blur });
             (1..=MAX_LOOK_UPS as u32).map(move |iterations| Way { temporal: TemporalStage::Reproject { iterations }, blur })
         };
-        ways.extend(look_ups(true).filter(|way| way.blur.is_some()));
-        ways.extend(look_ups(false));
+        match self.blur {
+            // Two nodes are the ends.
+            Some(BlurStage { nodes: 3.., .. }) => ways.extend(NodeDepths::ALL.into_iter().flat_map(look_ups)),
+            Some(_) => ways.extend([NodeDepths::Mid, NodeDepths::Each].into_iter().flat_map(look_ups)),
+            None => ways.extend(look_ups(NodeDepths::Each)),
+        }
         ways
     }
 
@@ -247,7 +251,7 @@ impl<'a> Truths<'a> {
     fn forecast(self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
         let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
-        Forecast { outcomes, detail, truths: self }
+        Forecast { outcomes, detail, truths: self, between_px: OnceLock::new() }
     }
 }
 
@@ -257,6 +261,8 @@ struct Forecast<'a> {
     detail: Option<&'a TerrainDetail<'a>>,
     /// One for each of the probes.
     outcomes: Vec<Outcome>,
+    /// [`Forecast::between_ends_px`], once it matters.
+    between_px: OnceLock<f64>,
 }
 
 impl Forecast<'_> {
@@ -266,7 +272,21 @@ impl Forecast<'_> {
 
     /// Without the chords of the exposure.
     pub fn total_px(&self, way: Way) -> f64 {
-        self.largest(|looked, run| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px())
+        let of_one = |looked: &Looked, run: &Outcome| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px();
+        self.largest(of_one) + SAFETY * self.between_ends_px(way)
+    }
+
+    /// Largest miss of nodes that take what lies between the depths of the exposure's ends.
+    fn between_ends_px(&self, way: Way) -> f64 {
+        let interpolates = way.blur.is_some_and(|blur| blur.depths == NodeDepths::Ends);
+        if !interpolates || !matches!(way.temporal, TemporalStage::Reproject { .. }) {
+            return 0.0;
+        }
+        *self.between_px.get_or_init(|| {
+            let of = |looked: &Looked| self.truths.trial.between_ends_px(&looked.probe, &looked.truth);
+            let px: Vec<f64> = self.truths.looked.par_iter().with_min_len(16).map(of).collect();
+            self.truths.largest(|i, _| px[i])
+        })
     }
 
     /// The first way within the tolerance, or the best there is.
@@ -300,7 +320,7 @@ impl Forecast<'_> {
         let Expected { resampling_dn, blur_dn } = case.expected;
         let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
         let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
-        let temporal_px = SAFETY * self.largest(|_, run| unsettled_px(run, way));
+        let temporal_px = SAFETY * (self.largest(|_, run| unsettled_px(run, way)) + self.between_ends_px(way));
         let depth_px = match stage {
             TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
@@ -369,7 +389,11 @@ fn error_px(run: &Outcome, way: Way) -> f64 {
         TemporalStage::Rk2 => run.rk2_px,
         TemporalStage::Reproject { iterations } => {
             let look_ups = (iterations as usize).min(MAX_LOOK_UPS);
-            if way.blur.is_some_and(|blur| blur.one_depth) { run.of_mid[look_ups].max(run.after[look_ups]) } else { run.after[look_ups] }
+            match way.blur.map(|blur| blur.depths) {
+                None => run.after[look_ups],
+                Some(NodeDepths::Mid) => run.of_mid[look_ups].max(run.after[look_ups]),
+                Some(NodeDepths::Ends | NodeDepths::Each) => run.handed_on[look_ups],
+            }
         }
     }
 }
@@ -377,7 +401,7 @@ fn error_px(run: &Outcome, way: Way) -> f64 {
 /// The part of it that a better temporal inverse would mend.
 fn unsettled_px(run: &Outcome, way: Way) -> f64 {
     match way {
-        Way { temporal: TemporalStage::Reproject { iterations }, blur } if !blur.is_some_and(|blur| blur.one_depth) => {
+        Way { temporal: TemporalStage::Reproject { iterations }, blur } if !blur.is_some_and(|blur| blur.depths == NodeDepths::Mid) => {
             run.unsettled[(iterations as usize).min(MAX_LOOK_UPS)]
         }
         _ => error_px(run, way),

@@ -11,7 +11,7 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, LensReach, SurfaceReads,
+    BlurStage, LensReach, NodeDepths, SurfaceReads,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
     surfaces::{Met, Surfaces},
@@ -218,7 +218,7 @@ impl<'a> Prospect<'a> {
         };
         let way = |sampling: Sampling, samples_per_px: f64| {
             let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
-            let blur = (nodes > 1).then_some(BlurStage { nodes, one_depth: false, samples_per_px, max_samples });
+            let blur = (nodes > 1).then_some(BlurStage { nodes, depths: NodeDepths::Each, samples_per_px, max_samples });
             (Sampling { samples_per_px, ..sampling }, blur)
         };
         // A few places tell what is far from keeping the tolerance.
@@ -371,6 +371,6 @@ impl Sampling {
             Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
             None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, MAX_SAMPLES)),
         };
-        BlurStage { nodes, one_depth: false, samples_per_px, max_samples }
+        BlurStage { nodes, depths: NodeDepths::Each, samples_per_px, max_samples }
     }
 }

@@ -50,13 +50,31 @@ impl SurfaceReads {
     pub const ALL: [Self; 3] = [Self::Two, Self::Four, Self::Grid];
 }
 
+/// Where the key frame's depth is looked up that the nodes of an exposure take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NodeDepths {
+    /// At mid-exposure, for all.
+    Mid,
+    /// At both ends; what is between takes what lies between. The second look-up begins with what the first has found, and so takes one
+    /// iteration less.
+    Ends,
+    /// In each, beginning with what the one before has found.
+    Each,
+}
+
+impl NodeDepths {
+    /// All of them, in the order of their time.
+    pub const ALL: [Self; 3] = [Self::Mid, Self::Ends, Self::Each];
+}
+
 /// Motion blur.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlurStage {
     /// Exactly known poses over the exposure.
     pub nodes: u32,
-    /// All of them take the key frame's depth that mid-exposure finds; otherwise each looks up its own.
-    pub one_depth: bool,
+    /// What depth they take.
+    pub depths: NodeDepths,
     /// Samples a pixel of path (up to 16 px; one a pixel beyond).
     pub samples_per_px: f64,
     /// Cap of the samples between two nodes.

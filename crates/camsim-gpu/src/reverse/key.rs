@@ -1,7 +1,7 @@
 //! What a kernel is composed of.
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, RayStage, TemporalStage},
+    plan::{EdgeStage, FramePlan, NodeDepths, RayStage, TemporalStage},
     scenario::Preset,
     temporal::TapStage,
 };
@@ -68,8 +68,8 @@ pub struct PipelineKey {
     pub temporal: TemporalKind,
     /// Exposure.
     pub blur: bool,
-    /// All nodes of the exposure take the depth of mid-exposure.
-    pub one_depth: bool,
+    /// Where depth is looked up for the nodes of the exposure, if there are any and it is.
+    pub depths: NodeDepths,
     /// What reads the ideal frame.
     pub tap: TapKind,
     /// More than one ideal frame.
@@ -97,7 +97,7 @@ impl PipelineKey {
             ray: plan.ray,
             temporal,
             blur: plan.blur.is_some(),
-            one_depth: plan.blur.is_some_and(|blur| blur.one_depth),
+            depths: plan.blur.map_or(NodeDepths::Each, |blur| blur.depths),
             tap: plan.taps.into(),
             keys: plan.keys.len() > 1,
             edges: plan.edges.into(),
@@ -128,13 +128,13 @@ impl PipelineKey {
                             continue;
                         }
                         let looks_up = blur && temporal == Reproject;
-                        for one_depth in [false, true].into_iter().filter(|&one_depth| looks_up || !one_depth) {
+                        for depths in NodeDepths::ALL.into_iter().filter(|&depths| looks_up || depths == NodeDepths::Each) {
                             for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
                                 keys.extend([false, true].map(|truth| Self {
                                     ray,
                                     temporal,
                                     blur,
-                                    one_depth,
+                                    depths,
                                     tap,
                                     keys: several,
                                     edges,
@@ -153,7 +153,7 @@ impl PipelineKey {
                     ray,
                     temporal: Rk2,
                     blur,
-                    one_depth: false,
+                    depths: NodeDepths::Each,
                     tap: TapKind::Bilinear,
                     keys: false,
                     edges: EdgeKind::None,
@@ -200,6 +200,12 @@ impl PipelineKey {
             EdgeKind::Samples => "reverse/edges/color/samples.wgsl",
             EdgeKind::None | EdgeKind::Centres => "reverse/edges/color/centres.wgsl",
         };
+        let nodes = match (self.temporal, self.depths) {
+            (TemporalKind::Reproject, NodeDepths::Mid) => "reverse/gather/nodes/mid.wgsl",
+            (TemporalKind::Reproject, NodeDepths::Ends) => "reverse/gather/nodes/ends.wgsl",
+            (TemporalKind::Reproject, NodeDepths::Each) => "reverse/gather/nodes/each.wgsl",
+            _ => "reverse/gather/nodes/solved.wgsl",
+        };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
             ("keys", keys),
@@ -207,7 +213,7 @@ impl PipelineKey {
             ("depth", depth),
             ("temporal_inverse", temporal),
             ("gather", gather),
-            ("nodes", if self.one_depth { "reverse/gather/nodes/one_depth.wgsl" } else { "reverse/gather/nodes/own_depth.wgsl" }),
+            ("nodes", nodes),
             ("tap", tap),
             ("edges", edges),
             ("surface_color", surface_color),
@@ -250,6 +256,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 476);
+        assert_eq!(PipelineKey::all().len(), 548);
     }
 }

@@ -1,0 +1,16 @@
+// The key frame's depth is looked up in the first and the last node of the exposure; nodes in between take what lies between. The second look-up
+// begins with what the first has found. Twin: camsim_core::temporal::reproject_nodes.
+var<private> first_depth: f32;
+var<private> depth_step: f32;
+
+fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
+    let last = frame.nodes - 1u;
+    first_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, 0u), 0.0, frame.iterations);
+    let last_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, last), first_depth, max(frame.iterations, 2u) - 1u);
+    depth_step = (last_depth - first_depth) / f32(last);
+    return next_node(pixel, ray, 0u);
+}
+
+fn next_node(pixel: vec2<u32>, ray: Ray, node: u32) -> Source {
+    return source_of_depth(ray.uv, pose_at_node(pixel, node), first_depth + f32(node) * depth_step);
+}
