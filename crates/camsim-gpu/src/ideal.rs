@@ -6,7 +6,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, TerrainDetail},
+    scene::{LodSelection, Scene, TerrainMesh},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
@@ -22,6 +22,7 @@ use crate::{
 mod fine;
 mod surfaces;
 
+pub(crate) use fine::whole;
 pub use fine::{FINE_SAMPLES, FineTarget};
 use fine::{ResolvePass, scale_of, texture};
 use surfaces::{draw_meshes, draw_terrain, index_buffer, place_meshes, place_terrain};
@@ -48,6 +49,13 @@ pub struct IdealTarget {
     pub depth: wgpu::Texture,
     /// Samples that colour and depth are resolved from, for frames with silhouettes.
     pub fine: Option<FineTarget>,
+    /// What surfaces are drawn to with one sample a pixel.
+    drawn_color: wgpu::TextureView,
+    drawn_depth: wgpu::TextureView,
+    /// The colour as the gather reads it.
+    pub gathered_color: wgpu::TextureView,
+    /// The depth as the gather reads it.
+    pub gathered_depth: wgpu::TextureView,
 }
 
 impl IdealTarget {
@@ -77,16 +85,13 @@ impl IdealTarget {
         let usage = written | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(preset), 1, usage);
         let depth = texture(gpu, "camsim.ideal.depth", allocated_px, depth_format, 1, usage);
-        Self { allocated_px, color, depth, fine }
-    }
-
-    /// The colour as the gather reads it.
-    #[must_use]
-    pub fn color_view(&self) -> wgpu::TextureView {
-        let format = (self.color.format() == STORED_FORMAT).then_some(STORED_VIEW);
+        let format = (color.format() == STORED_FORMAT).then_some(STORED_VIEW);
         // A storage usage of the texture would not be legal for a view of another format, and the gather needs none.
         let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
-        self.color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() })
+        let gathered_color = color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
+        let (drawn_color, drawn_depth) = fine.as_ref().map_or((&color, &depth), |fine| (&fine.centre_color, &fine.centre_depth));
+        let (drawn_color, drawn_depth, gathered_depth) = (whole(drawn_color), whole(drawn_depth), whole(&depth));
+        Self { allocated_px, color, depth, fine, drawn_color, drawn_depth, gathered_color, gathered_depth }
     }
 }
 
@@ -255,7 +260,8 @@ impl IdealPass {
         IdealSlot { camera, chunks, indices, placements, camera_group, terrain_group, mesh_groups }
     }
 
-    /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
+    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
+    /// of detail that the terrain got in the middle one.
     ///
     /// # Errors
     /// Faults of the shader files.
@@ -267,7 +273,7 @@ impl IdealPass {
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
-        max_terrain_error_px: f64,
+        meshes: &[TerrainMesh],
         target: &IdealTarget,
     ) -> Result<LodSelection, ComposeError> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
@@ -278,36 +284,30 @@ impl IdealPass {
                 self.pipelines.insert(key, self.surface_pipelines(gpu, key)?);
             }
         }
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (color, depth) = target.fine.as_ref().map_or((&target.color, &target.depth), |fine| (&fine.centre_color, &fine.centre_depth));
-        let (color_view, depth_view) = (view(color), view(depth));
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
-            gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
-            let focal_px = plan.ideal.focal_px.max_element();
+            recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let mut lod = LodSelection::default();
             let mut indices = 0;
-            if let Some(terrain) = &scene.terrain {
-                let mesh = TerrainDetail::new(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px).mesh();
-                indices = place_terrain(gpu, slot, terrain, &mesh, base_ned_m);
+            if let (Some(terrain), Some(mesh)) = (&scene.terrain, meshes.get(k)) {
+                indices = place_terrain(gpu, recorder, slot, terrain, mesh, base_ned_m);
                 lod = mesh.lod;
             }
             index_counts.push(indices);
-            place_meshes(gpu, slot, buffers, base_ned_m);
+            place_meshes(recorder, slot, buffers, base_ned_m);
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
         }
-        let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), depth_attachment(&depth_view));
+        let mut pass =
+            recorder.render_pass("ideal", Some(color_attachment(&target.drawn_color, scene)), depth_attachment(&target.drawn_depth));
         self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, &index_counts);
         drop(pass);
         if let (Some(fine), Some(key)) = (&target.fine, fine) {
-            let depth_view = fine.depth_view();
-            let color_view = fine.color.as_ref().map(view);
-            let color = color_view.as_ref().map(|view| color_attachment(view, scene));
-            let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&depth_view));
+            let color = fine.color_view.as_ref().map(|view| color_attachment(view, scene));
+            let mut pass = recorder.render_pass("ideal_fine", color, depth_attachment(&fine.depth_view));
             self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, &index_counts);
             drop(pass);
             self.resolve.encode(gpu, recorder, plan, target, fine);

@@ -1,5 +1,7 @@
 //! Supersampled ideal frames: their textures, and the pass that resolves them to one colour and depth a pixel.
 
+use std::sync::OnceLock;
+
 use camsim_core::plan::{EdgeStage, FramePlan};
 
 use super::{COLOR_FORMAT, DEPTH_FORMAT, IdealTarget, STORED_FORMAT, STORED_VIEW, key_rows};
@@ -35,12 +37,18 @@ pub struct FineTarget {
     pub lines: wgpu::Texture,
     /// A word for each 8x8 ideal pixels of the target, see `shaders/ideal/reach.wgsl`.
     pub within_reach: wgpu::Buffer,
+    /// All of [`FineTarget::depth`].
+    pub depth_view: wgpu::TextureView,
+    /// All of [`FineTarget::color`].
+    pub color_view: Option<wgpu::TextureView>,
     /// The same half done.
     within_rows: wgpu::Buffer,
     /// Four u32: width and height of an ideal frame, and the rows from one to the next, for the resolve pass.
     layout: wgpu::Buffer,
     /// Four u32: tiles across and down, and the reach in tiles.
     tile_layout: wgpu::Buffer,
+    /// Bind groups of the resolve pass, made when it is first recorded.
+    groups: OnceLock<[wgpu::BindGroup; 3]>,
 }
 
 /// Fine pixels along a side of an ideal pixel, for frames that need any.
@@ -82,25 +90,29 @@ impl FineTarget {
         };
         let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
+        let depth = texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage);
+        let color = (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage));
         Self {
             scale,
+            depth_view: whole(&depth),
+            color_view: color.as_ref().map(whole),
             lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
             layout: buffer("camsim.ideal.layout", 16, uniform),
             tile_layout: buffer("camsim.ideal.tile_layout", 16, uniform),
             within_reach: buffer("camsim.ideal.within_reach", 4 * tiles[0] * tiles[1], storage),
             within_rows: buffer("camsim.ideal.within_rows", 4 * tiles[0] * tiles[1], storage),
-            depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
-            color: (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage)),
+            depth,
+            color,
             centre_color: texture(gpu, "camsim.ideal.centre_color", ideal_px, COLOR_FORMAT, 1, usage),
             centre_depth: texture(gpu, "camsim.ideal.centre_depth", ideal_px, DEPTH_FORMAT, 1, usage),
+            groups: OnceLock::new(),
         }
     }
+}
 
-    /// The depth samples.
-    #[must_use]
-    pub fn depth_view(&self) -> wgpu::TextureView {
-        self.depth.create_view(&wgpu::TextureViewDescriptor::default())
-    }
+/// A view of all of a texture.
+pub(crate) fn whole(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// Samples to pixels, the mark of silhouettes, and what lies within reach of each place.
@@ -166,28 +178,26 @@ impl ResolvePass {
         let (rows, last) = (key_rows(&plan.ideal), plan.keys.len() as u32 - 1);
         let size_px = [plan.ideal.size_px[0], rows * last + plan.ideal.size_px[1]];
         let layout = [plan.ideal.size_px[0], plan.ideal.size_px[1], rows, 0];
-        gpu.queue.write_buffer(&fine.layout, 0, bytemuck::cast_slice(&layout));
+        recorder.write(&fine.layout, 0, bytemuck::cast_slice(&layout));
         let [across, down] = target.allocated_px.map(|side| side.div_ceil(WORKGROUP_PX));
         let reach = plan.mark_reach_px().div_ceil(WORKGROUP_PX).min(across.max(down));
-        gpu.queue.write_buffer(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
+        recorder.write(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
         // What the frame does not cover has nothing.
         recorder.encoder().clear_buffer(&fine.within_reach, 0, None);
-        let [group, along_rows, along_columns] = self.bind(gpu, target, fine);
+        let [group, along_rows, along_columns] = fine.groups.get_or_init(|| self.bind(gpu, target, fine));
         let mut pass = recorder.compute_pass("resolve");
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(0, group, &[]);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
         for (pipeline, group) in self.reach.iter().zip([along_rows, along_columns]) {
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[]);
+            pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups((across * down).div_ceil(REACH_WORKGROUP), 1, 1);
         }
     }
 
     fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &FineTarget) -> [wgpu::BindGroup; 3] {
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (depth_samples, drawn, color, depth) = (fine.depth_view(), view(&fine.centre_color), view(&target.color), view(&target.depth));
-        let lines = view(&fine.lines);
+        let (drawn, color, depth, lines) = (whole(&fine.centre_color), whole(&target.color), whole(&target.depth), whole(&fine.lines));
         let bind = |layout: &wgpu::BindGroupLayout, entries: &[wgpu::BindGroupEntry<'_>]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.resolve"), layout, entries })
         };
@@ -200,7 +210,7 @@ impl ResolvePass {
             bind(
                 &self.layout,
                 &[
-                    entry(0, wgpu::BindingResource::TextureView(&depth_samples)),
+                    entry(0, wgpu::BindingResource::TextureView(&fine.depth_view)),
                     entry(1, wgpu::BindingResource::TextureView(&drawn)),
                     entry(2, wgpu::BindingResource::TextureView(&color)),
                     entry(3, wgpu::BindingResource::TextureView(&depth)),
