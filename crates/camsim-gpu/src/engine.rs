@@ -37,7 +37,7 @@ mod ahead;
 mod readback;
 mod slot;
 
-use ahead::{Ahead, Prepared};
+use ahead::{Ahead, Prepared, Preparer};
 use readback::{Output, coords, read_mapped, read_texture};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
@@ -271,9 +271,9 @@ impl Session<'_> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let planner = self.planner.clone();
-        std::thread::scope(|scope| {
-            let mut ahead = Ahead::start(scope, &planner, frames.into_iter());
+        let preparer = Preparer::new(self.planner.clone());
+        rayon::in_place_scope(|scope| {
+            let mut ahead = Ahead::start(scope, &preparer, frames.into_iter());
             let mut in_flight: Option<InFlight> = None;
             let mut slot = 0;
             loop {
@@ -405,19 +405,20 @@ impl Session<'_> {
         }
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
-        let target = self.targets.iter().position(|target| target.ideal.serves(size_px, plan.edges)).unwrap_or_else(|| {
+        // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
+        let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan.edges));
+        let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let fine = plan.edges != EdgeStage::None;
             let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
             let alike = |target: &Target| target.ideal.fine.is_some() == fine;
             if self.targets.iter().filter(|target| alike(target)).count() >= limit {
-                // `drawn` may name a target behind the oldest, but is replaced below before anybody looks.
-                let oldest = self.targets.iter().position(alike).unwrap_or_default();
-                self.targets.remove(oldest);
+                let longest_unused = self.targets.iter().position(alike).unwrap_or_default();
+                self.targets.remove(longest_unused);
             }
-            let ideal = IdealTarget::new(gpu, size_px, plan.edges, plan.preset);
-            self.targets.push(Target { ideal, groups: Default::default() });
-            self.targets.len() - 1
+            Target { ideal: IdealTarget::new(gpu, size_px, plan.edges, plan.preset), groups: Default::default() }
         });
+        self.targets.push(target);
+        let target = self.targets.len() - 1;
         let sequence = self.planner.sequence();
         let ideal_slots = &mut self.slots[slot].ideal;
         while ideal_slots.len() < poses.len() {

@@ -2,13 +2,20 @@
 
 mod common;
 
-use std::{convert::Infallible, sync::Arc};
+use std::{
+    convert::Infallible,
+    ops::Range,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
 
 use camsim_core::{
     scenario::{Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, ZoomSpec},
     sequence::Sequence,
 };
-use camsim_gpu::Engine;
+use camsim_gpu::{Engine, RenderError, engine::Finished};
 use common::{city, engine, pattern, scenario, sequence, steady};
 use glam::DVec3;
 
@@ -84,4 +91,73 @@ fn a_frame_makes_nothing_on_the_device() {
         assert_eq!(most, before, "{name}: with a frame in flight, and before");
         assert_eq!(held(&engine), before, "{name}: after and before");
     }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn frames_come_in_the_order_asked_for_whoever_asks() {
+    let engine = engine();
+    let mut session = engine.session::<Infallible>(plain(false), &[Channel::Color]).expect("session");
+    let order = [7, 3, 3, 11, 0, 5];
+    let mut render = || {
+        let (mut came, mut pictures) = (Vec::new(), Vec::new());
+        let mut keep = |finished: Finished| {
+            came.push(finished.frame.index);
+            pictures.push(finished.frame.color_rgba);
+            Ok(())
+        };
+        session.render::<Infallible>(order, &mut keep).expect("render");
+        assert_eq!(came, order);
+        pictures
+    };
+    let from_outside = render();
+    assert!(from_outside[1] == from_outside[2] && from_outside[0] != from_outside[1]);
+    // A thread of the pool that plans, which has no other: nobody else is there to plan while it waits.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    assert!(pool.install(render) == from_outside);
+}
+
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("no room for frame {0}")]
+struct Full(u64);
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_first_fault_stops_everything_and_the_session_goes_on() {
+    let engine = engine();
+    let sequence = plain(false);
+    let planned = Arc::new(AtomicU64::new(0));
+    let mut session = engine.session::<Full>(sequence, &[Channel::Color]).expect("session");
+    let mut came = Vec::new();
+    for full_at in [0, 1, 4] {
+        came.clear();
+        planned.store(0, Ordering::Relaxed);
+        let endless = (0..).inspect(|_| _ = planned.fetch_add(1, Ordering::Relaxed));
+        let outcome = session.render(endless, &mut |finished| {
+            let frame = finished.frame.index;
+            came.push(frame);
+            if frame < full_at { Ok(()) } else { Err(Full(frame)) }
+        });
+        assert!(matches!(outcome, Err(RenderError::Sink(Full(frame))) if frame == full_at), "{outcome:?}");
+        assert!(came.iter().copied().eq(0..=full_at), "{came:?}");
+        let begun = planned.load(Ordering::Relaxed);
+        assert!(begun <= full_at + 7, "{begun} frames were begun for {full_at}");
+    }
+    // A plan that fails: the frames before it are handed over first.
+    let mut sequence = Sequence::clone(&plain(true));
+    sequence.zoom_track = vec![(0.0, 1.0), (0.11, 1.5), (0.12, f64::NAN)];
+    let mut session = engine.session::<Full>(Arc::new(sequence), &[Channel::Color]).expect("session");
+    let mut indices = |frames: Range<u64>| {
+        let mut came = Vec::new();
+        let outcome = session.render::<Full>(frames, &mut |finished| {
+            came.push(finished.frame.index);
+            Ok(())
+        });
+        (came, outcome)
+    };
+    let (came, outcome) = indices(0..10);
+    assert!(matches!(outcome, Err(RenderError::Plan(_))), "{outcome:?}");
+    assert_eq!(came, [0, 1, 2, 3]);
+    let (came, outcome) = indices(0..3);
+    assert!(outcome.is_ok() && came == [0, 1, 2], "{outcome:?}");
 }

@@ -1,12 +1,12 @@
-//! Frames' plans and what else the host computes for them, on threads of their own while the device works on earlier frames. All of it is
-//! a function of sequence and frame number: who computes it, and when, does not show.
+//! Frames' plans and what else the host computes for them, made by rayon's threads while the device works on earlier frames. All of it is a
+//! function of sequence and frame number: who computes it, and when, does not show.
 
 use std::{
+    collections::VecDeque,
     sync::{
-        Arc,
-        mpsc::{Receiver, Sender, channel},
+        Arc, Mutex, PoisonError,
+        mpsc::{Receiver, TryRecvError, channel},
     },
-    thread::Scope,
     time::Instant,
 };
 
@@ -19,10 +19,8 @@ use camsim_core::{
 
 use super::ms_since;
 
-/// Threads that plan, at most. Each plan uses all processors in parts; a second thread fills the parts that do not.
-const MOST_PLANNERS: usize = 4;
-/// Frames that a planner has been asked for and that nobody has taken yet: one to be taken, one at work.
-const ASKED_OF_A_PLANNER: usize = 2;
+/// Frames that are prepared before they are asked for, at most. Each is some megabytes of triangles and poses.
+const MOST_AHEAD: usize = 4;
 
 /// A frame before anything of it is recorded.
 #[derive(Debug)]
@@ -65,26 +63,32 @@ struct View {
     terrain_error_px: f64,
 }
 
-/// Prepares frames; the triangles of the last one are kept for as long as they are seen in the same way.
+/// Prepares frames; the last triangles are kept for as long as they are seen in the same way.
 #[derive(Debug)]
-struct Preparer<'a> {
-    planner: &'a Planner,
-    seen: Option<(View, Arc<[TerrainMesh]>)>,
+pub(super) struct Preparer {
+    planner: Arc<Planner>,
+    seen: Mutex<Option<(View, Arc<[TerrainMesh]>)>>,
 }
 
-impl Preparer<'_> {
-    fn prepare(&mut self, frame: u64) -> Result<Prepared, PlanError> {
+impl Preparer {
+    pub fn new(planner: Arc<Planner>) -> Self {
+        Self { planner, seen: Mutex::new(None) }
+    }
+
+    fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
         let begun = Instant::now();
         let plan = self.planner.plan(frame)?;
         let meshes = self.meshes(&plan);
-        let lines = Lines::of(&plan, self.planner);
+        let lines = Lines::of(&plan, &self.planner);
         Ok(Prepared { plan, meshes, lines, plan_ms: ms_since(begun) })
     }
 
-    fn meshes(&mut self, plan: &FramePlan) -> Arc<[TerrainMesh]> {
+    fn meshes(&self, plan: &FramePlan) -> Arc<[TerrainMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
         let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px };
-        if let Some((_, meshes)) = self.seen.as_ref().filter(|(seen, _)| *seen == view) {
+        // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
+        let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, meshes)) = seen().as_ref().filter(|(seen, _)| *seen == view) {
             return meshes.clone();
         }
         let focal_px = plan.ideal.focal_px.max_element();
@@ -93,55 +97,61 @@ impl Preparer<'_> {
             view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh())
         });
         let meshes: Arc<[TerrainMesh]> = meshes.collect();
-        self.seen = Some((view, meshes.clone()));
+        *seen() = Some((view, meshes.clone()));
         meshes
     }
 }
 
-/// Frames in the order asked for, each prepared before it is taken.
-pub(super) struct Ahead<I> {
+/// Frames in the order asked for, each begun before it is taken.
+pub(super) struct Ahead<'a, 'scope, I> {
+    scope: &'a rayon::Scope<'scope>,
+    preparer: &'scope Preparer,
     frames: I,
-    /// They take turns, so that frames come in order without being sorted.
-    planners: Vec<(Sender<u64>, Receiver<Result<Prepared, PlanError>>)>,
-    asked: usize,
-    taken: usize,
+    begun: VecDeque<Receiver<Result<Prepared, PlanError>>>,
 }
 
-impl<I: Iterator<Item = u64>> Ahead<I> {
-    /// Starts the planners. They end when this is dropped.
-    pub fn start<'scope>(scope: &'scope Scope<'scope, '_>, planner: &'scope Planner, frames: I) -> Self {
-        let threads = std::thread::available_parallelism().map_or(1, usize::from).div_ceil(2).min(MOST_PLANNERS);
-        let threads = frames.size_hint().1.map_or(threads, |most| most.clamp(1, threads));
-        let planners = (0..threads).map(|_| {
-            let (ask, asked) = channel();
-            let (give, given) = channel();
-            let mut preparer = Preparer { planner, seen: None };
-            // Nobody takes what is given after a fault: no more is needed then.
-            scope.spawn(move || asked.into_iter().map(|frame| preparer.prepare(frame)).try_for_each(|prepared| give.send(prepared)));
-            (ask, given)
-        });
-        let mut ahead = Self { frames, planners: planners.collect(), asked: 0, taken: 0 };
-        ahead.ask();
+impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
+    /// Begins with the first frames. The scope ends when those that have been begun are done.
+    pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
+        let mut ahead = Self { scope, preparer, frames, begun: VecDeque::new() };
+        ahead.begin();
         ahead
     }
 
     /// The next frame; `None` after the last.
     pub fn next(&mut self) -> Option<Result<Prepared, PlanError>> {
-        let (_, given) = &self.planners[self.taken % self.planners.len()];
-        // A planner that panics gives no answer; the scope then panics too, when it ends.
-        let prepared = (self.taken < self.asked).then(|| given.recv().ok()).flatten()?;
-        self.taken += 1;
-        self.ask();
+        let given = self.begun.pop_front()?;
+        // Planning that panics gives no answer; the scope then panics too, when it ends.
+        let prepared = wait(&given)?;
+        self.begin();
         Some(prepared)
     }
 
-    fn ask(&mut self) {
-        while self.asked - self.taken < ASKED_OF_A_PLANNER * self.planners.len() {
+    fn begin(&mut self) {
+        // One to be taken and one at work at least; more where there are threads for it.
+        let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
+        while self.begun.len() < ahead {
             let Some(frame) = self.frames.next() else { return };
-            let (ask, _) = &self.planners[self.asked % self.planners.len()];
-            // A planner that is gone shows when its frame is to be taken.
-            let _ = ask.send(frame);
-            self.asked += 1;
+            let (give, given) = channel();
+            let preparer = self.preparer;
+            self.scope.spawn(move |_| {
+                // After a fault nobody takes it.
+                let _ = give.send(preparer.prepare(frame));
+            });
+            self.begun.push_back(given);
+        }
+    }
+}
+
+/// Waits. A thread of rayon's own first does what there is to do: it may be the only one.
+fn wait<T>(given: &Receiver<T>) -> Option<T> {
+    loop {
+        match given.try_recv() {
+            Ok(value) => return Some(value),
+            Err(TryRecvError::Disconnected) => return None,
+            Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => {}
+            // Not of the pool, or others are at it.
+            Err(TryRecvError::Empty) => return given.recv().ok(),
         }
     }
 }
