@@ -3,9 +3,9 @@
 #import ideal/terrain_vertex.wgsl
 
 // Of a key's triangles: three a triangle.
-@group(2) @binding(0) var<storage, read> indices: array<u32>;
+@group(3) @binding(0) var<storage, read> indices: array<u32>;
 // A word for each 8x8 pixels of the target; the lowest bit says whether there are marks.
-@group(2) @binding(1) var<storage, read> tiles: array<u32>;
+@group(2) @binding(0) var<storage, read> tiles: array<u32>;
 
 struct KeyLayout {
     ideal_size_px: vec2<u32>,
@@ -19,7 +19,7 @@ struct KeyLayout {
     pad2: u32,
 }
 
-@group(2) @binding(2) var<uniform> key_layout: KeyLayout;
+@group(3) @binding(1) var<uniform> key_layout: KeyLayout;
 
 struct Kept {
     // Arguments of an indexed draw.
@@ -30,8 +30,8 @@ struct Kept {
     first_instance: u32,
 }
 
-@group(2) @binding(3) var<storage, read_write> kept: Kept;
-@group(2) @binding(4) var<storage, read_write> kept_indices: array<u32>;
+@group(3) @binding(2) var<storage, read_write> kept: Kept;
+@group(3) @binding(3) var<storage, read_write> kept_indices: array<u32>;
 
 // Samples this far from a mark are read for the border's line: LINE_REACH and a neighbour, pixels.
 const READ_PX: f32 = 5.0;

@@ -13,9 +13,13 @@ impl TimesTable {
     /// Takes in a frame.
     pub fn add(&mut self, times: &FrameTimes) {
         self.frames += 1;
-        for (name, ms) in
-            [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: wait", times.wait_ms), ("host: read", times.read_ms)]
-        {
+        for (name, ms) in [
+            ("host: plan", times.plan_ms),
+            ("host: record", times.record_ms),
+            ("host: submit", times.submit_ms),
+            ("host: wait", times.wait_ms),
+            ("host: read", times.read_ms),
+        ] {
             self.part(name.to_owned(), ms);
         }
         for pass in &times.passes {

@@ -92,9 +92,13 @@ pub struct GpuContext {
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
+///
+/// Arguments of indirect calls come from camsim's own shaders, which bound them; wgpu's check of each would be a pass of its own, and a buffer
+/// made for it.
 fn instance() -> wgpu::Instance {
     let from_env = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
-    wgpu::Instance::new(wgpu::InstanceDescriptor { backends: from_env.backends & wgpu::Backends::PRIMARY, ..from_env })
+    let flags = from_env.flags.difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
+    wgpu::Instance::new(wgpu::InstanceDescriptor { backends: from_env.backends & wgpu::Backends::PRIMARY, flags, ..from_env })
 }
 
 /// All adapters of this machine, the one that would be used first.

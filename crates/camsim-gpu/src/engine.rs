@@ -10,7 +10,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage, TemporalStage, line_poses, line_times},
+    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -24,16 +24,22 @@ use crate::{
     ideal::{IdealPass, IdealTarget, STORED_FORMAT},
     layout::Truth,
     recorder::{PassClock, PassTime, Recorder},
-    reverse::{EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms, lens_inverse::LensInversePass},
+    reverse::{
+        EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms,
+        lens_inverse::{LensInversePass, LensMap},
+    },
     shaders::ComposeError,
+    staging::Staging,
     upload::SceneBuffers,
 };
 
+mod ahead;
 mod readback;
 mod slot;
 
+use ahead::{Ahead, Prepared, Preparer};
 use readback::{Output, coords, read_mapped, read_texture};
-use slot::{Slot, list_buffer, pose_buffer};
+use slot::{Slot, Target, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
 const FRAMES_IN_FLIGHT: usize = 2;
@@ -106,7 +112,7 @@ impl Engine {
         channels: &[Channel],
     ) -> Result<Session<'_>, RenderError<E>> {
         let gpu = &self.gpu;
-        let planner = Planner::new(sequence.clone(), channels, gpu.max_side_px())?;
+        let planner = Arc::new(Planner::new(sequence.clone(), channels, gpu.max_side_px())?);
         let pixels = u64::from(sequence.scenario.camera.size_px[0]) * u64::from(sequence.scenario.camera.size_px[1]);
         gpu.check_storage("the output frame's colour", 16 * pixels, "reduce camera.size_px")?;
         if planner.wants_truth() {
@@ -173,16 +179,16 @@ struct Drawn {
 #[derive(Debug)]
 pub struct Session<'a> {
     engine: &'a Engine,
-    planner: Planner,
+    planner: Arc<Planner>,
     buffers: SceneBuffers,
     ideal_pass: IdealPass,
     reverse_pass: ReversePass,
     lens_pass: Option<LensInversePass>,
     /// Current lens map, by the bits of its zoom value.
-    lens_map: Option<(u64, wgpu::Texture)>,
+    lens_map: Option<(u64, LensMap)>,
     /// Maps of the zoom table's entries: starts for those in between.
-    zoom_maps: HashMap<usize, wgpu::Texture>,
-    targets: Vec<IdealTarget>,
+    zoom_maps: HashMap<usize, LensMap>,
+    targets: Vec<Target>,
     drawn: Option<Drawn>,
     slots: Vec<Slot>,
     /// Pixels of the frame at work that may see silhouettes, for frames that have any.
@@ -207,10 +213,12 @@ pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
 /// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameTimes {
-    /// The host planned it.
+    /// The host planned it and computed its tables, on another thread than what follows.
     pub plan_ms: f64,
     /// The host wrote its tables and recorded its passes.
     pub record_ms: f64,
+    /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame before.
+    pub submit_ms: f64,
     /// The host waited for the device.
     pub wait_ms: f64,
     /// The host took the pictures.
@@ -253,7 +261,8 @@ impl Session<'_> {
         self.slots.iter().all(|slot| slot.clock.is_some())
     }
 
-    /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next.
+    /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next, and
+    /// other threads plan those that follow; `frames` is read ahead of them.
     ///
     /// # Errors
     /// The first fault of planning, device or sink; frames before it have been handed over.
@@ -262,25 +271,35 @@ impl Session<'_> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let mut waiting: Option<InFlight> = None;
-        let mut slot = 0;
-        for frame in frames {
-            let begun = Instant::now();
-            let plan = self.planner.plan(frame)?;
-            let plan_ms = ms_since(begun);
-            let mut submitted = self.submit(plan, slot).map_err(RenderError::lift)?;
-            submitted.times.plan_ms = plan_ms;
-            slot = (slot + 1) % FRAMES_IN_FLIGHT;
-            if let Some(done) = waiting.replace(submitted) {
-                let finished = self.finish(done)?;
-                sink(finished).map_err(RenderError::Sink)?;
+        let preparer = Preparer::new(self.planner.clone());
+        rayon::in_place_scope(|scope| {
+            let mut ahead = Ahead::start(scope, &preparer, frames.into_iter());
+            let mut in_flight: Option<InFlight> = None;
+            let mut slot = 0;
+            loop {
+                let submitted = match ahead.next() {
+                    Some(Ok(prepared)) => self.submit(prepared, slot).map(Some),
+                    Some(Err(fault)) => Err(fault.into()),
+                    None => Ok(None),
+                };
+                slot = (slot + 1) % FRAMES_IN_FLIGHT;
+                let (next, fault) = match submitted {
+                    Ok(next) => (next, None),
+                    Err(fault) => (None, Some(RenderError::lift(fault))),
+                };
+                let is_last = next.is_none();
+                if let Some(done) = std::mem::replace(&mut in_flight, next)
+                    && let Err(fault) = self.finish(done).map_err(RenderError::Gpu).and_then(|frame| sink(frame).map_err(RenderError::Sink))
+                {
+                    // Nobody wants the frame that is in flight, but its buffers can only be used again after it; a second fault is not told.
+                    let _ = in_flight.map(|unwanted| self.finish(unwanted));
+                    return Err(fault);
+                }
+                if is_last {
+                    return fault.map_or(Ok(()), Err);
+                }
             }
-        }
-        if let Some(done) = waiting {
-            let finished = self.finish(done)?;
-            sink(finished).map_err(RenderError::Sink)?;
-        }
-        Ok(())
+        })
     }
 
     /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A (with the paper preset sRGB
@@ -290,7 +309,7 @@ impl Session<'_> {
     /// Device faults; `None` before the first frame.
     pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
-        let target = &self.targets[drawn.target];
+        let target = &self.targets[drawn.target].ideal;
         let [width, height] = drawn.ideal.size_px;
         let color: Vec<f32> = if target.color.format() == STORED_FORMAT {
             let bytes = read_texture::<[u8; 4]>(&self.engine.gpu, &target.color, width, height)?;
@@ -305,33 +324,45 @@ impl Session<'_> {
         Ok(Some((drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())))
     }
 
-    /// Every pass of a frame, in order.
-    fn submit(&mut self, plan: FramePlan, slot: usize) -> Result<InFlight, RenderErrorBase> {
+    /// Records and submits a frame.
+    fn submit(&mut self, prepared: Prepared, slot: usize) -> Result<InFlight, RenderErrorBase> {
         let gpu = &self.engine.gpu;
         let begun = Instant::now();
         let mut clock = self.slots[slot].clock.take();
-        let mut recorder = Recorder::new(&gpu.device, clock.as_mut());
-        if plan.ray == RayStage::LensMap {
-            self.lens_inverse(&mut recorder, &plan);
-        }
-        self.ideal(&mut recorder, &plan, slot)?;
-        self.reverse(&mut recorder, &plan, slot)?;
-        let slot_buffers = &mut self.slots[slot];
-        slot_buffers.color.copy(recorder.encoder());
-        if let Some(truth) = &slot_buffers.truth {
-            truth.copy(recorder.encoder());
-        }
-        let submission = gpu.queue.submit([recorder.finish()]);
-        slot_buffers.clock = clock;
-        let outputs = [Some(&slot_buffers.color), slot_buffers.truth.as_ref()].into_iter().flatten().map(|output| &output.on_host);
-        for on_host in outputs.chain(slot_buffers.clock.as_ref().map(PassClock::on_host)) {
-            // A failed mapping shows when the range is read.
-            on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
-        }
+        let mut staging = self.slots[slot].staging.take().unwrap_or_else(|| Staging::new(&gpu.device));
+        let commands = self.record(&prepared, slot, Recorder::new(&gpu.device, clock.as_mut(), &mut staging));
+        self.slots[slot].clock = clock;
+        self.slots[slot].staging = Some(staging);
+        let commands = commands.inspect_err(|_| {
+            // What was recorded to be kept will never be there.
+            (self.drawn, self.lens_map) = (None, None);
+            self.zoom_maps.clear();
+            self.targets.clear();
+        })?;
+        let record_ms = ms_since(begun);
+        let begun = Instant::now();
+        let submission = gpu.queue.submit([commands]);
+        let submit_ms = ms_since(begun);
+        self.slots[slot].recall();
         self.engine.check()?;
         let lod = self.drawn.as_ref().map(|drawn| drawn.lod).unwrap_or_default();
-        let times = FrameTimes { record_ms: ms_since(begun), ..FrameTimes::default() };
-        Ok(InFlight { slot, plan, submission, lod, times })
+        let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, submit_ms, ..FrameTimes::default() };
+        Ok(InFlight { slot, plan: prepared.plan, submission, lod, times })
+    }
+
+    /// Every pass of a frame, in order.
+    fn record(&mut self, prepared: &Prepared, slot: usize, mut recorder: Recorder<'_>) -> Result<wgpu::CommandBuffer, RenderErrorBase> {
+        if prepared.plan.ray == RayStage::LensMap {
+            self.lens_inverse(&mut recorder, &prepared.plan);
+        }
+        self.ideal(&mut recorder, prepared, slot)?;
+        self.reverse(&mut recorder, prepared, slot)?;
+        let slot = &self.slots[slot];
+        slot.color.copy(recorder.encoder());
+        if let Some(truth) = &slot.truth {
+            truth.copy(recorder.encoder());
+        }
+        Ok(recorder.finish()?)
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
@@ -342,27 +373,27 @@ impl Session<'_> {
             return;
         }
         let pass = self.lens_pass.get_or_insert_with(|| LensInversePass::new(&gpu.device));
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let mut warm = None;
         if let (Some(table), Some(zoom)) = (self.planner.zoom_table(), plan.zoom) {
             let entry = table.nearest(zoom);
             if let (false, Ok(camera)) = (self.zoom_maps.contains_key(&entry), table.at(table.entries()[entry].at)) {
-                let map = LensInversePass::create_map(&gpu.device, camera.size_px);
-                pass.encode(&gpu.device, recorder, &camera, &view(&map), None);
+                let mut map = LensMap::new(&gpu.device, camera.size_px);
+                pass.encode(&gpu.device, recorder, &camera, &mut map, None);
                 self.zoom_maps.insert(entry, map);
             }
-            warm = self.zoom_maps.get(&entry).map(view);
+            warm = self.zoom_maps.get(&entry);
         }
-        let map = match self.lens_map.take() {
+        let mut map = match self.lens_map.take() {
             Some((_, map)) => map,
-            None => LensInversePass::create_map(&gpu.device, plan.camera.size_px),
+            None => LensMap::new(&gpu.device, plan.camera.size_px),
         };
-        pass.encode(&gpu.device, recorder, &plan.camera, &view(&map), warm.as_ref());
+        pass.encode(&gpu.device, recorder, &plan.camera, &mut map, warm);
         self.lens_map = Some((bits, map));
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    fn ideal(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
+    fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), ComposeError> {
+        let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
             drawn.poses == poses
@@ -374,18 +405,20 @@ impl Session<'_> {
         }
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
-        let target = self.targets.iter().position(|target| target.serves(size_px, plan.edges)).unwrap_or_else(|| {
+        // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
+        let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan.edges));
+        let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let fine = plan.edges != EdgeStage::None;
             let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
-            let alike = |target: &IdealTarget| target.fine.is_some() == fine;
+            let alike = |target: &Target| target.ideal.fine.is_some() == fine;
             if self.targets.iter().filter(|target| alike(target)).count() >= limit {
-                // `drawn` may name a target behind the oldest, but is replaced below before anybody looks.
-                let oldest = self.targets.iter().position(alike).unwrap_or_default();
-                self.targets.remove(oldest);
+                let longest_unused = self.targets.iter().position(alike).unwrap_or_default();
+                self.targets.remove(longest_unused);
             }
-            self.targets.push(IdealTarget::new(gpu, size_px, plan.edges, plan.preset));
-            self.targets.len() - 1
+            Target { ideal: IdealTarget::new(gpu, size_px, plan.edges, plan.preset), groups: Default::default() }
         });
+        self.targets.push(target);
+        let target = self.targets.len() - 1;
         let sequence = self.planner.sequence();
         let ideal_slots = &mut self.slots[slot].ideal;
         while ideal_slots.len() < poses.len() {
@@ -398,57 +431,48 @@ impl Session<'_> {
             &sequence.scene,
             &self.buffers,
             plan,
-            plan.terrain_error_px,
-            &self.targets[target],
+            &prepared.meshes,
+            &self.targets[target].ideal,
         )?;
         self.drawn = Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
         Ok(())
     }
 
     /// Pass 3: the output frame.
-    fn reverse(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan, slot: usize) -> Result<(), ComposeError> {
+    fn reverse(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), ComposeError> {
         let gpu = &self.engine.gpu;
-        let sequence = self.planner.sequence();
-        let uniforms = frame_uniforms(plan, &sequence.scenario, self.coords_phase);
-        let (poses, times);
-        let bytes: &[u8] = match plan.temporal {
-            TemporalStage::Linear | TemporalStage::Rk2 => {
-                times = line_times(plan);
-                bytemuck::cast_slice(&times.dt_s)
-            }
-            _ => {
-                poses = line_poses(plan, &sequence.path);
-                bytemuck::cast_slice(&poses.entries)
-            }
-        };
-        let slot = &mut self.slots[slot];
-        if slot.poses.size() < bytes.len() as u64 {
-            slot.poses = pose_buffer(gpu, bytes.len() as u64);
+        let plan = &prepared.plan;
+        let uniforms = frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase);
+        let bytes = prepared.lines.bytes();
+        let buffers = &mut self.slots[slot];
+        if buffers.poses.size() < bytes.len() as u64 {
+            buffers.poses = pose_buffer(gpu, bytes.len() as u64);
+            self.targets.iter_mut().for_each(|target| target.groups[slot].clear());
         }
-        gpu.queue.write_buffer(&slot.frame, 0, bytemuck::bytes_of(&uniforms));
-        gpu.queue.write_buffer(&slot.poses, 0, bytes);
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let Some(target) = self.drawn.as_ref().map(|drawn| &self.targets[drawn.target]) else { return Ok(()) };
-        let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| view(map)) } else { None };
+        recorder.write(&buffers.frame, 0, bytemuck::bytes_of(&uniforms));
+        recorder.write(&buffers.poses, 0, bytes);
+        let Some(target) = self.drawn.as_ref().map(|drawn| &mut self.targets[drawn.target]) else { return Ok(()) };
+        let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| &map.view) } else { None };
         let listed = (plan.edges != EdgeStage::None).then(|| {
             let listed = self.listed.get_or_insert_with(|| list_buffer(gpu, plan.camera.size_px));
-            gpu.queue.write_buffer(listed, 0, bytemuck::cast_slice(&EMPTY_LIST));
+            recorder.write(listed, 0, bytemuck::cast_slice(&EMPTY_LIST));
             &*listed
         });
         let bindings = ReverseBindings {
             listed,
-            frame: &slot.frame,
+            frame: &buffers.frame,
             noise_table: &self.noise_table,
-            color: &target.color_view(),
-            depth: &view(&target.depth),
-            fine: target.fine.as_ref(),
-            poses: &slot.poses,
+            color: &target.ideal.gathered_color,
+            depth: &target.ideal.gathered_depth,
+            fine: target.ideal.fine.as_ref(),
+            poses: &buffers.poses,
             vignette: &self.vignette,
-            lens_map: lens_map.as_ref(),
-            out_color: &slot.color.on_device,
-            out_truth: slot.truth.as_ref().map(|truth| &truth.on_device),
+            lens_map,
+            out_color: &buffers.color.on_device,
+            out_truth: buffers.truth.as_ref().map(|truth| &truth.on_device),
         };
-        self.reverse_pass.encode(gpu, recorder, PipelineKey::of(plan), plan.camera.size_px, &bindings)
+        let groups = &mut target.groups[slot];
+        self.reverse_pass.encode(gpu, recorder, PipelineKey::of(plan), plan.camera.size_px, &bindings, groups)
     }
 
     /// Waits for a frame and takes its pictures.

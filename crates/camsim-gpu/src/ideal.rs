@@ -6,7 +6,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, TerrainDetail},
+    scene::{LodSelection, Scene, TerrainMesh},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
@@ -24,6 +24,7 @@ mod marks;
 mod near_marks;
 mod surfaces;
 
+pub(crate) use fine::whole;
 pub use fine::{FINE_SAMPLES, FineTarget};
 use fine::{TILE_PX, scale_of, texture};
 use marks::MarksPass;
@@ -54,6 +55,13 @@ pub struct IdealTarget {
     pub depth: wgpu::Texture,
     /// What frames with silhouettes have besides.
     pub fine: Option<FineTarget>,
+    /// What surfaces are drawn to with one sample a pixel.
+    drawn_color: wgpu::TextureView,
+    drawn_depth: wgpu::TextureView,
+    /// The colour as the gather reads it.
+    pub gathered_color: wgpu::TextureView,
+    /// The depth as the gather reads it.
+    pub gathered_depth: wgpu::TextureView,
 }
 
 impl IdealTarget {
@@ -78,16 +86,12 @@ impl IdealTarget {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(preset), 1, usage);
         let depth = texture(gpu, "camsim.ideal.depth", allocated_px, DEPTH_FORMAT, 1, usage);
-        Self { allocated_px, color, depth, fine }
-    }
-
-    /// The colour as the gather reads it.
-    #[must_use]
-    pub fn color_view(&self) -> wgpu::TextureView {
-        let format = (self.color.format() == STORED_FORMAT).then_some(STORED_VIEW);
+        let format = (color.format() == STORED_FORMAT).then_some(STORED_VIEW);
         // Not every usage of the texture is legal for a view of another format, and the gather needs one only.
         let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
-        self.color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() })
+        let gathered_color = color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
+        let (drawn_color, drawn_depth, gathered_depth) = (whole(&color), whole(&depth), whole(&depth));
+        Self { allocated_px, color, depth, fine, drawn_color, drawn_depth, gathered_color, gathered_depth }
     }
 }
 
@@ -260,7 +264,8 @@ impl IdealPass {
         IdealSlot { camera, chunks, indices, kept, placements, camera_group, terrain_group, mesh_groups }
     }
 
-    /// Records the ideal frames of a plan, each with its own slot; returns the level of detail that the terrain got in the middle one.
+    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
+    /// of detail that the terrain got in the middle one.
     ///
     /// # Errors
     /// Faults of the shader files.
@@ -272,7 +277,7 @@ impl IdealPass {
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
-        max_terrain_error_px: f64,
+        meshes: &[TerrainMesh],
         target: &IdealTarget,
     ) -> Result<LodSelection, ComposeError> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
@@ -283,28 +288,25 @@ impl IdealPass {
                 self.pipelines.insert(key, self.surface_pipelines(gpu, key)?);
             }
         }
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let (color_view, depth_view) = (view(&target.color), view(&target.depth));
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = key.pose.position_ned_m.round();
-            gpu.queue.write_buffer(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
-            let focal_px = plan.ideal.focal_px.max_element();
+            recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let mut lod = LodSelection::default();
             let mut indices = 0;
-            if let Some(terrain) = &scene.terrain {
-                let mesh = TerrainDetail::new(terrain, &key.pose, plan.tangents(), focal_px, max_terrain_error_px).mesh();
-                indices = place_terrain(gpu, slot, terrain, &mesh, base_ned_m);
+            if let (Some(terrain), Some(mesh)) = (&scene.terrain, meshes.get(k)) {
+                indices = place_terrain(gpu, recorder, slot, terrain, mesh, base_ned_m);
                 lod = mesh.lod;
             }
             index_counts.push(indices);
-            place_meshes(gpu, slot, buffers, base_ned_m);
+            place_meshes(recorder, slot, buffers, base_ned_m);
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
         }
-        let mut pass = recorder.render_pass("ideal", Some(color_attachment(&color_view, scene)), Some(depth_attachment(&depth_view)));
+        let mut pass =
+            recorder.render_pass("ideal", Some(color_attachment(&target.drawn_color, scene)), Some(depth_attachment(&target.drawn_depth)));
         self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
         drop(pass);
         if let (Some(fine), Some(key), EdgeStage::Supersampled { thin, .. }) = (&target.fine, fine, plan.edges) {
@@ -312,10 +314,8 @@ impl IdealPass {
                 self.marks.mark(gpu, recorder, plan, target, fine, false);
                 self.near_marks.encode(gpu, recorder, plan, target.allocated_px[0].div_ceil(TILE_PX), slots, &index_counts, fine);
             }
-            let depth_view = fine.depth_view();
-            let color_view = fine.color.as_ref().map(view);
-            let color = color_view.as_ref().map(|view| color_attachment(view, scene));
-            let mut pass = recorder.render_pass("ideal_fine", color, Some(depth_attachment(&depth_view)));
+            let color = fine.color_view.as_ref().map(|view| color_attachment(view, scene));
+            let mut pass = recorder.render_pass("ideal_fine", color, Some(depth_attachment(&fine.depth_view)));
             self.draw_keys(&mut pass, key, plan, fine.scale, buffers, slots, |k| match (thin, index_counts[k]) {
                 (false, 1..) => Triangles::Kept,
                 (_, count) => Triangles::All(count),

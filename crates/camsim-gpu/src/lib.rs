@@ -1,7 +1,7 @@
 //! The ideal render and the reverse pipeline on wgpu.
 //!
 //! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) -> layout (mirrors of shader
-//! structs) -> scene upload -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back).
+//! structs) -> scene upload -> staging and recorder (a frame's writes and commands) -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back).
 //! The engine executes [`camsim_core::plan::FramePlan`]s and decides nothing itself.
 
 #![warn(missing_docs)]
@@ -13,6 +13,8 @@ pub mod shaders;
 pub mod layout;
 
 pub mod upload;
+
+pub mod staging;
 
 pub mod recorder;
 

@@ -1,6 +1,9 @@
-//! Commands of a frame as they are recorded, and how long each pass takes on the device by its own clock.
+//! Commands of a frame as they are recorded, what the host writes for them, and how long each pass takes on the device by its own clock.
 
-use crate::context::GpuContext;
+use crate::{
+    context::{GpuContext, GpuError},
+    staging::Staging,
+};
 
 /// Passes of a frame: lens map and the map it starts from, ideal frame, marks, triangles near them, samples, stamp, borders, reverse, rays; and
 /// some to spare.
@@ -70,18 +73,31 @@ impl PassClock {
 /// One frame's commands.
 #[derive(Debug)]
 pub struct Recorder<'a> {
+    device: &'a wgpu::Device,
     encoder: wgpu::CommandEncoder,
     clock: Option<&'a mut PassClock>,
+    staging: &'a mut Staging,
+    fault: Option<GpuError>,
 }
 
 impl<'a> Recorder<'a> {
-    /// Begins a frame; its passes are timed where there is a clock.
+    /// Begins a frame; its passes are timed where there is a clock. What is written for it goes through `staging`, which no other frame
+    /// may use before this one has been waited for.
     #[must_use]
-    pub fn new(device: &wgpu::Device, mut clock: Option<&'a mut PassClock>) -> Self {
+    pub fn new(device: &'a wgpu::Device, mut clock: Option<&'a mut PassClock>, staging: &'a mut Staging) -> Self {
         if let Some(clock) = &mut clock {
             clock.names.clear();
         }
-        Self { encoder: device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") }), clock }
+        staging.begin();
+        let encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.frame") });
+        Self { device, encoder, clock, staging, fault: None }
+    }
+
+    /// Writes to a buffer, after all that has been recorded so far and before what follows. A fault shows in [`Recorder::finish`].
+    pub fn write(&mut self, to: &wgpu::Buffer, offset: u64, bytes: &[u8]) {
+        if self.fault.is_none() {
+            self.fault = self.staging.write(self.device, &mut self.encoder, to, offset, bytes).err();
+        }
     }
 
     /// For commands outside of passes.
@@ -125,8 +141,14 @@ impl<'a> Recorder<'a> {
     }
 
     /// The commands, to be submitted.
-    #[must_use]
-    pub fn finish(mut self) -> wgpu::CommandBuffer {
+    ///
+    /// # Errors
+    /// [`GpuError::Device`] if the device would not take what was written.
+    pub fn finish(mut self) -> Result<wgpu::CommandBuffer, GpuError> {
+        if let Some(fault) = self.fault {
+            return Err(fault);
+        }
+        self.staging.end();
         if let Some(clock) = self.clock {
             let stamps = 2 * clock.names.len() as u32;
             if stamps > 0 {
@@ -134,6 +156,6 @@ impl<'a> Recorder<'a> {
             }
             self.encoder.copy_buffer_to_buffer(&clock.resolved, 0, &clock.on_host, 0, STAMPS_BYTES);
         }
-        self.encoder.finish()
+        Ok(self.encoder.finish())
     }
 }

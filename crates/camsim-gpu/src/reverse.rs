@@ -16,7 +16,7 @@ use glam::DMat3;
 
 use crate::{
     context::GpuContext,
-    ideal::{FineTarget, key_rows},
+    ideal::{FineTarget, key_rows, whole},
     layout::FrameUniforms,
     recorder::Recorder,
     shaders::{self, ComposeError},
@@ -70,6 +70,20 @@ pub fn list_size(size_px: [u32; 2]) -> u64 {
     4 * (EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]))
 }
 
+/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and that of its silhouettes, made when a key is first
+/// used. They go with the target, and when a buffer of the frame's is replaced.
+#[derive(Debug, Default)]
+pub struct ReverseGroups(HashMap<PipelineKey, [Groups; 2]>);
+
+type Groups = [Option<wgpu::BindGroup>; 4];
+
+impl ReverseGroups {
+    /// A buffer was replaced.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+}
+
 #[derive(Debug)]
 struct Variant {
     pipeline: wgpu::ComputePipeline,
@@ -103,7 +117,7 @@ impl ReversePass {
         Self { variants: HashMap::new(), sampler }
     }
 
-    /// Records the kernel of a plan.
+    /// Records the kernel of a plan; `groups` are those of these `bindings`.
     ///
     /// # Errors
     /// Faults of the shader files.
@@ -114,6 +128,7 @@ impl ReversePass {
         key: PipelineKey,
         size_px: [u32; 2],
         bindings: &ReverseBindings<'_>,
+        groups: &mut ReverseGroups,
     ) -> Result<(), ComposeError> {
         let kernels = match self.variants.entry(key) {
             Entry::Occupied(compiled) => compiled.into_mut(),
@@ -122,13 +137,17 @@ impl ReversePass {
                 silhouettes: (key.edges != EdgeKind::None).then(|| Variant::new(gpu, key, RAYS_SHADER, "rays", true)).transpose()?,
             }),
         };
+        let [of_picture, of_silhouettes] = groups.0.entry(key).or_insert_with(|| {
+            let bind = |variant: &Variant| variant.bind(gpu, &self.sampler, bindings);
+            [bind(&kernels.picture), kernels.silhouettes.as_ref().map(bind).unwrap_or_default()]
+        });
         let mut pass = recorder.compute_pass("reverse");
-        kernels.picture.set(gpu, &mut pass, &self.sampler, bindings);
+        kernels.picture.set(&mut pass, of_picture);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
         drop(pass);
         if let (Some(variant), Some(listed)) = (&kernels.silhouettes, bindings.listed) {
             let mut pass = recorder.compute_pass("rays");
-            variant.set(gpu, &mut pass, &self.sampler, bindings);
+            variant.set(&mut pass, of_silhouettes);
             pass.dispatch_workgroups_indirect(listed, 0);
         }
         Ok(())
@@ -160,16 +179,16 @@ impl Variant {
         Ok(Self { pipeline, groups })
     }
 
-    fn set(&self, gpu: &GpuContext, pass: &mut wgpu::ComputePass<'_>, sampler: &wgpu::Sampler, bindings: &ReverseBindings<'_>) {
+    fn set(&self, pass: &mut wgpu::ComputePass<'_>, groups: &Groups) {
         pass.set_pipeline(&self.pipeline);
-        for (group, i) in self.bind(gpu, sampler, bindings).iter().zip(0..) {
+        for (group, i) in groups.iter().zip(0..) {
             if let Some(group) = group {
                 pass.set_bind_group(i, group, &[]);
             }
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, sampler: &wgpu::Sampler, b: &ReverseBindings<'_>) -> [Option<wgpu::BindGroup>; 4] {
+    fn bind(&self, gpu: &GpuContext, sampler: &wgpu::Sampler, b: &ReverseBindings<'_>) -> Groups {
         let view = |view| wgpu::BindingResource::TextureView(view);
         let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
             vec![(0, b.frame.as_entire_binding()), (1, b.noise_table.as_entire_binding())],
@@ -183,10 +202,9 @@ impl Variant {
             Vec::new(),
             vec![(0, b.out_color.as_entire_binding())],
         ];
-        let whole = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let fine = b.fine.map(|fine| (fine.color.as_ref().map(whole), fine.depth_view(), whole(&fine.lines), &fine.within_reach));
+        let fine = b.fine.map(|fine| (fine.color_view.as_ref(), &fine.depth_view, whole(&fine.lines), &fine.within_reach));
         if let Some((color, depth, lines, within_reach)) = &fine {
-            resources[1].extend(color.as_ref().map(|color| (5, view(color))));
+            resources[1].extend(color.map(|color| (5, view(color))));
             resources[1].extend([(6, view(depth)), (7, view(lines)), (8, within_reach.as_entire_binding())]);
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));

@@ -3,7 +3,11 @@
 
 use camsim_core::camera::{CameraModel, INVALID_UV};
 use camsim_core::lens::{Lens, LensModel};
-use camsim_gpu::{recorder::Recorder, reverse::lens_inverse::LensInversePass};
+use camsim_gpu::{
+    recorder::Recorder,
+    reverse::lens_inverse::{LensInversePass, LensMap},
+    staging::Staging,
+};
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -38,13 +42,12 @@ impl Gpu {
         Self { device, queue, pass }
     }
 
-    fn map(&self, camera: &CameraModel, warm: Option<&wgpu::Texture>) -> (Vec<[f32; 2]>, wgpu::Texture) {
+    fn map(&self, camera: &CameraModel, warm: Option<&LensMap>) -> (Vec<[f32; 2]>, LensMap) {
         let [width, height] = camera.size_px;
-        let texture = LensInversePass::create_map(&self.device, camera.size_px);
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let warm = warm.map(|map| map.create_view(&wgpu::TextureViewDescriptor::default()));
-        let mut recorder = Recorder::new(&self.device, None);
-        self.pass.encode(&self.device, &mut recorder, camera, &view, warm.as_ref());
+        let mut map_on_device = LensMap::new(&self.device, camera.size_px);
+        let mut staging = Staging::new(&self.device);
+        let mut recorder = Recorder::new(&self.device, None, &mut staging);
+        self.pass.encode(&self.device, &mut recorder, camera, &mut map_on_device, warm);
         let row_bytes = (width * 8).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: None,
@@ -53,14 +56,14 @@ impl Gpu {
             mapped_at_creation: false,
         });
         recorder.encoder().copy_texture_to_buffer(
-            texture.as_image_copy(),
+            map_on_device.texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &buffer,
                 layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: None },
             },
-            texture.size(),
+            map_on_device.texture.size(),
         );
-        self.queue.submit([recorder.finish()]);
+        self.queue.submit([recorder.finish().unwrap()]);
         buffer.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
         self.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         let bytes = buffer.get_mapped_range(..).unwrap();
@@ -68,7 +71,7 @@ impl Gpu {
             .chunks_exact(row_bytes as usize)
             .flat_map(|row| bytemuck::cast_slice::<u8, [f32; 2]>(&row[..width as usize * 8]).iter().copied())
             .collect();
-        (map, texture)
+        (map, map_on_device)
     }
 }
 

@@ -2,19 +2,29 @@
 
 use camsim_core::sequence::Sequence;
 
-use super::readback::Output;
+use super::{FRAMES_IN_FLIGHT, readback::Output};
 use crate::{
     context::GpuContext,
-    ideal::{IdealPass, IdealSlot},
+    ideal::{IdealPass, IdealSlot, IdealTarget},
     layout::{FrameUniforms, Truth},
     recorder::PassClock,
-    reverse::list_size,
+    reverse::{ReverseGroups, list_size},
+    staging::Staging,
     upload::SceneBuffers,
 };
+
+/// Textures of ideal frames, and what each frame in flight reads them by.
+#[derive(Debug)]
+pub(super) struct Target {
+    pub ideal: IdealTarget,
+    pub groups: [ReverseGroups; FRAMES_IN_FLIGHT],
+}
 
 /// Buffers of one frame in flight.
 #[derive(Debug)]
 pub(super) struct Slot {
+    /// What the host writes for the frame; made with the first.
+    pub staging: Option<Staging>,
     /// One for each ideal frame, as many as any frame needed so far.
     pub ideal: Vec<IdealSlot>,
     pub frame: wgpu::Buffer,
@@ -34,6 +44,7 @@ impl Slot {
             mapped_at_creation: false,
         });
         Self {
+            staging: None,
             ideal: vec![ideal_pass.slot(gpu, &sequence.scene, buffers)],
             frame,
             poses: pose_buffer(gpu, 48 * width.max(height)),
@@ -42,12 +53,23 @@ impl Slot {
             clock: None,
         }
     }
+
+    /// Once the frame has been submitted: asks for what the host reads, and for what it writes the next one to.
+    pub fn recall(&mut self) {
+        let outputs = [Some(&self.color), self.truth.as_ref()].into_iter().flatten().map(|output| &output.on_host);
+        for on_host in outputs.chain(self.clock.as_ref().map(PassClock::on_host)) {
+            // A failed mapping shows when the range is read.
+            on_host.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+        self.staging.iter_mut().for_each(Staging::recall);
+    }
 }
 
-pub(super) fn pose_buffer(gpu: &GpuContext, size: u64) -> wgpu::Buffer {
+/// For at least so many bytes: a power of two, so that few frames need another.
+pub(super) fn pose_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("camsim.poses"),
-        size,
+        size: bytes.next_power_of_two(),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })

@@ -1,16 +1,19 @@
 //! Textures and buffers of ideal frames in which silhouettes can be seen.
 
+use std::sync::OnceLock;
+
 use camsim_core::plan::EdgeStage;
 
-use super::{COLOR_FORMAT, DEPTH_FORMAT, STORED_FORMAT, STORED_VIEW, marks::LINES_FORMAT};
+use super::{
+    COLOR_FORMAT, DEPTH_FORMAT, STORED_FORMAT, STORED_VIEW,
+    marks::{LINES_FORMAT, MARKED_HEAD_BYTES, MarkGroups},
+};
 use crate::context::GpuContext;
 
 /// Samples of a fine pixel; every adapter has 4, at the standard places.
 pub const FINE_SAMPLES: u32 = 4;
 /// Edge of the square tiles that marks are listed by, pixels.
 pub(super) const TILE_PX: u32 = 8;
-/// Arguments of a draw and of a dispatch, before the list of marked tiles.
-pub(super) const MARKED_HEAD_BYTES: u64 = 32;
 /// A marked tile's place and its 64 bits.
 const MARKED_TILE_BYTES: u64 = 12;
 
@@ -27,6 +30,10 @@ pub struct FineTarget {
     pub lines: wgpu::Texture,
     /// A word for each tile of the target, see `shaders/ideal/reach.wgsl`.
     pub within_reach: wgpu::Buffer,
+    /// All of [`FineTarget::depth`].
+    pub depth_view: wgpu::TextureView,
+    /// All of [`FineTarget::color`].
+    pub color_view: Option<wgpu::TextureView>,
     /// The same half done.
     pub(super) within_rows: wgpu::Buffer,
     /// The tiles that have marks: `shaders/ideal/marked_tiles.wgsl`.
@@ -37,6 +44,10 @@ pub struct FineTarget {
     pub(super) tile_layout: wgpu::Buffer,
     /// Four f32: width and height of the target.
     pub(super) target_px: wgpu::Buffer,
+    /// Made when the marks are first recorded.
+    pub(super) mark_groups: OnceLock<MarkGroups>,
+    /// The tiles alone, for `shaders/ideal/near_marks.wgsl`; likewise.
+    pub(super) near_marks_group: OnceLock<wgpu::BindGroup>,
 }
 
 /// Fine pixels along a side of an ideal pixel, for frames that need any.
@@ -78,10 +89,12 @@ impl FineTarget {
         };
         let (storage, uniform) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::UNIFORM);
         let written = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
+        let depth = texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage);
+        let color = (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage));
         Self {
             scale,
-            depth: texture(gpu, "camsim.ideal.fine_depth", size_px, DEPTH_FORMAT, FINE_SAMPLES, usage),
-            color: (scale > 1).then(|| texture(gpu, "camsim.ideal.fine_color", size_px, COLOR_FORMAT, FINE_SAMPLES, usage)),
+            depth_view: whole(&depth),
+            color_view: color.as_ref().map(whole),
             lines: texture(gpu, "camsim.ideal.lines", size_px, LINES_FORMAT, 1, written),
             within_reach: buffer("camsim.ideal.within_reach", 4 * across * down, storage),
             within_rows: buffer("camsim.ideal.within_rows", 4 * across * down, storage),
@@ -93,12 +106,15 @@ impl FineTarget {
             layout: buffer("camsim.ideal.layout", 16, uniform),
             tile_layout: buffer("camsim.ideal.tile_layout", 16, uniform),
             target_px: buffer("camsim.ideal.target_px", 16, uniform),
+            depth,
+            color,
+            mark_groups: OnceLock::new(),
+            near_marks_group: OnceLock::new(),
         }
     }
+}
 
-    /// The depth samples.
-    #[must_use]
-    pub fn depth_view(&self) -> wgpu::TextureView {
-        self.depth.create_view(&wgpu::TextureViewDescriptor::default())
-    }
+/// A view of all of a texture.
+pub(crate) fn whole(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

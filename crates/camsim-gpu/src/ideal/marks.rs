@@ -4,7 +4,7 @@ use camsim_core::plan::FramePlan;
 
 use super::{
     COLOR_FORMAT, IdealTarget,
-    fine::{FineTarget, MARKED_HEAD_BYTES, TILE_PX},
+    fine::{FineTarget, TILE_PX, whole},
     key_rows,
 };
 use crate::{
@@ -19,6 +19,10 @@ pub(super) const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Ui
 const REACH_WORKGROUP: u32 = 64;
 /// Head of the list of marked tiles before a frame: a draw of strips of four vertices, none yet, and an empty dispatch.
 const NO_MARKED: [u32; 8] = [4, 0, 0, 0, 0, 1, 1, 0];
+/// Bytes of that head.
+pub(super) const MARKED_HEAD_BYTES: u64 = 4 * NO_MARKED.len() as u64;
+/// Where its arguments of a dispatch begin.
+const DISPATCH_BYTES: u64 = 16;
 
 /// What marks look at: at each pixel's middle, or at its samples too, where something thinner than a pixel may be in view.
 pub(crate) fn spread_slot(thin: bool) -> Slot {
@@ -34,6 +38,16 @@ pub(super) struct MarksPass {
     borders: Compute,
     reach_layout: wgpu::BindGroupLayout,
     reach: [wgpu::ComputePipeline; 2],
+}
+
+/// Bind groups of a target.
+#[derive(Debug)]
+pub(super) struct MarkGroups {
+    /// Without and with samples.
+    marks: [wgpu::BindGroup; 2],
+    stamp: wgpu::BindGroup,
+    borders: wgpu::BindGroup,
+    reach: [wgpu::BindGroup; 2],
 }
 
 #[derive(Debug)]
@@ -88,48 +102,31 @@ impl MarksPass {
     ) {
         let (rows, last) = (key_rows(&plan.ideal), plan.keys.len() as u32 - 1);
         let [width, height] = plan.ideal.size_px;
-        gpu.queue.write_buffer(&fine.layout, 0, bytemuck::cast_slice(&[width, height, rows, fine.scale]));
-        gpu.queue.write_buffer(
-            &fine.target_px,
-            0,
-            bytemuck::cast_slice(&[target.allocated_px[0] as f32, target.allocated_px[1] as f32, 0.0, 0.0]),
-        );
-        gpu.queue.write_buffer(&fine.marked, 0, bytemuck::cast_slice(&NO_MARKED));
-        debug_assert_eq!(size_of_val(&NO_MARKED) as u64, MARKED_HEAD_BYTES);
+        let target_px = [target.allocated_px[0] as f32, target.allocated_px[1] as f32, 0.0, 0.0];
+        recorder.write(&fine.layout, 0, bytemuck::cast_slice(&[width, height, rows, fine.scale]));
+        recorder.write(&fine.target_px, 0, bytemuck::cast_slice(&target_px));
+        recorder.write(&fine.marked, 0, bytemuck::cast_slice(&NO_MARKED));
         // What the frame does not cover has nothing.
         recorder.encoder().clear_buffer(&fine.within_reach, 0, None);
-        let (depth, samples) = (view(&target.depth), fine.depth_view());
-        let marks = &self.marks[usize::from(thin)];
-        let mut resources = vec![
-            wgpu::BindingResource::TextureView(&depth),
-            fine.within_reach.as_entire_binding(),
-            fine.layout.as_entire_binding(),
-            fine.marked.as_entire_binding(),
-        ];
-        if thin {
-            resources.push(wgpu::BindingResource::TextureView(&samples));
-        }
-        let group = bind(gpu, &marks.layout, resources);
+        let groups = fine.mark_groups.get_or_init(|| self.bind(gpu, target, fine));
         let mut pass = recorder.compute_pass("marks");
-        pass.set_pipeline(&marks.pipeline);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(&self.marks[usize::from(thin)].pipeline);
+        pass.set_bind_group(0, &groups.marks[usize::from(thin)], &[]);
         pass.dispatch_workgroups(width.div_ceil(TILE_PX), (rows * last + height).div_ceil(TILE_PX), 1);
     }
 
     /// Writes the marks into the frame's colour; once they are known.
     pub(super) fn stamp(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, target: &IdealTarget, fine: &FineTarget) {
-        let (layout, pipeline) = &self.stamp;
-        let group = bind(gpu, layout, vec![fine.marked.as_entire_binding(), fine.target_px.as_entire_binding()]);
-        let color = view(&target.color);
+        let groups = fine.mark_groups.get_or_init(|| self.bind(gpu, target, fine));
         let attachment = wgpu::RenderPassColorAttachment {
-            view: &color,
+            view: &target.drawn_color,
             depth_slice: None,
             resolve_target: None,
             ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
         };
         let mut pass = recorder.render_pass("stamp", Some(attachment), None);
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(&self.stamp.1);
+        pass.set_bind_group(0, &groups.stamp, &[]);
         pass.draw_indirect(&fine.marked, 0);
     }
 
@@ -137,27 +134,36 @@ impl MarksPass {
     pub(super) fn borders(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, target: &IdealTarget, fine: &FineTarget) {
         let [across, down] = target.allocated_px.map(|side| side.div_ceil(TILE_PX));
         let reach = plan.mark_reach_px().div_ceil(TILE_PX).min(across.max(down));
-        gpu.queue.write_buffer(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
-        let (samples, lines) = (fine.depth_view(), view(&fine.lines));
-        let resources = vec![
-            wgpu::BindingResource::TextureView(&samples),
-            fine.marked.as_entire_binding(),
-            fine.layout.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&lines),
-        ];
-        let group = bind(gpu, &self.borders.layout, resources);
-        let reach_group = |from: &wgpu::Buffer, to: &wgpu::Buffer| {
-            bind(gpu, &self.reach_layout, vec![from.as_entire_binding(), to.as_entire_binding(), fine.tile_layout.as_entire_binding()])
-        };
-        let reach_groups = [reach_group(&fine.within_reach, &fine.within_rows), reach_group(&fine.within_rows, &fine.within_reach)];
+        recorder.write(&fine.tile_layout, 0, bytemuck::cast_slice(&[across, down, reach, 0]));
+        let groups = fine.mark_groups.get_or_init(|| self.bind(gpu, target, fine));
         let mut pass = recorder.compute_pass("borders");
         pass.set_pipeline(&self.borders.pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups_indirect(&fine.marked, 16);
-        for (pipeline, group) in self.reach.iter().zip(&reach_groups) {
+        pass.set_bind_group(0, &groups.borders, &[]);
+        pass.dispatch_workgroups_indirect(&fine.marked, DISPATCH_BYTES);
+        for (pipeline, group) in self.reach.iter().zip(&groups.reach) {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.dispatch_workgroups((across * down).div_ceil(REACH_WORKGROUP), 1, 1);
+        }
+    }
+
+    fn bind(&self, gpu: &GpuContext, target: &IdealTarget, fine: &FineTarget) -> MarkGroups {
+        let bind = |layout: &wgpu::BindGroupLayout, resources: &[wgpu::BindingResource<'_>]| {
+            let entries: Vec<_> =
+                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource: resource.clone() }).collect();
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.marks"), layout, entries: &entries })
+        };
+        let lines = whole(&fine.lines);
+        let [samples, depth, lines] = [&fine.depth_view, &target.gathered_depth, &lines].map(wgpu::BindingResource::TextureView);
+        let of = wgpu::Buffer::as_entire_binding;
+        let (marked, layout) = (of(&fine.marked), of(&fine.layout));
+        let marks = [depth, of(&fine.within_reach), layout.clone(), marked.clone(), samples.clone()];
+        let reach = |from, to| bind(&self.reach_layout, &[of(from), of(to), of(&fine.tile_layout)]);
+        MarkGroups {
+            marks: [bind(&self.marks[0].layout, &marks[..4]), bind(&self.marks[1].layout, &marks)],
+            stamp: bind(&self.stamp.0, &[marked.clone(), of(&fine.target_px)]),
+            borders: bind(&self.borders.layout, &[samples, marked, layout, lines]),
+            reach: [reach(&fine.within_reach, &fine.within_rows), reach(&fine.within_rows, &fine.within_reach)],
         }
     }
 }
@@ -173,15 +179,6 @@ fn storage(read_only: bool) -> wgpu::BindingType {
 fn depth_texture(multisampled: bool) -> wgpu::BindingType {
     let view_dimension = wgpu::TextureViewDimension::D2;
     wgpu::BindingType::Texture { sample_type: wgpu::TextureSampleType::Depth, view_dimension, multisampled }
-}
-
-fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn bind(gpu: &GpuContext, layout: &wgpu::BindGroupLayout, resources: Vec<wgpu::BindingResource<'_>>) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.marks"), layout, entries: &entries })
 }
 
 fn pipeline_layout(gpu: &GpuContext, label: &str, layout: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {

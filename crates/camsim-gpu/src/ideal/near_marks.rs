@@ -1,5 +1,7 @@
 //! The terrain's triangles near marks: they alone are drawn with several samples a pixel.
 
+use std::sync::OnceLock;
+
 use camsim_core::plan::FramePlan;
 
 use super::{IdealSlot, fine::FineTarget, key_rows};
@@ -27,12 +29,15 @@ pub(super) struct Kept {
     pub(super) arguments: wgpu::Buffer,
     /// As many as the key has.
     pub(super) indices: wgpu::Buffer,
+    /// Made when the choice is first recorded.
+    group: OnceLock<wgpu::BindGroup>,
 }
 
 /// The pipeline that keeps them.
 #[derive(Debug)]
 pub(super) struct NearMarksPass {
-    layout: wgpu::BindGroupLayout,
+    tiles_layout: wgpu::BindGroupLayout,
+    kept_layout: wgpu::BindGroupLayout,
     pipeline: wgpu::ComputePipeline,
 }
 
@@ -46,6 +51,7 @@ impl Kept {
             layout: create("camsim.ideal.key_layout", size_of::<KeyLayout>() as u64, wgpu::BufferUsages::UNIFORM | written),
             arguments: create("camsim.ideal.kept", size_of_val(&NONE_KEPT) as u64, storage | wgpu::BufferUsages::INDIRECT | written),
             indices: create("camsim.ideal.kept_indices", index_bytes, storage | wgpu::BufferUsages::INDEX),
+            group: OnceLock::new(),
         }
     }
 }
@@ -55,14 +61,17 @@ impl NearMarksPass {
     pub(super) fn new(gpu: &GpuContext, camera: &wgpu::BindGroupLayout, terrain: &wgpu::BindGroupLayout) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let storage = |read_only| wgpu::BufferBindingType::Storage { read_only };
-        let types = [storage(true), storage(true), wgpu::BufferBindingType::Uniform, storage(false), storage(false)];
-        let entries: Vec<_> = (0..).zip(types).map(|(binding, ty)| super::buffer_entry(binding, wgpu::ShaderStages::COMPUTE, ty)).collect();
-        let layout =
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.near_marks"), entries: &entries });
+        let layout = |types: &[wgpu::BufferBindingType]| {
+            let entries: Vec<_> =
+                (0..).zip(types).map(|(binding, &ty)| super::buffer_entry(binding, wgpu::ShaderStages::COMPUTE, ty)).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.ideal.near_marks"), entries: &entries })
+        };
+        let tiles_layout = layout(&[storage(true)]);
+        let kept_layout = layout(&[storage(true), wgpu::BufferBindingType::Uniform, storage(false), storage(false)]);
         let module = shaders::module(device, SHADER, SHADER, &[])?;
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(SHADER),
-            bind_group_layouts: &[Some(camera), Some(terrain), Some(&layout)],
+            bind_group_layouts: &[Some(camera), Some(terrain), Some(&tiles_layout), Some(&kept_layout)],
             immediate_size: 0,
         });
         let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -73,7 +82,7 @@ impl NearMarksPass {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        Ok(Self { layout, pipeline })
+        Ok(Self { tiles_layout, kept_layout, pipeline })
     }
 
     /// Records the choice for each key of a plan. The marks are known.
@@ -98,30 +107,30 @@ impl NearMarksPass {
                     index_count,
                     ..KeyLayout::default()
                 };
-                gpu.queue.write_buffer(&slot.kept.layout, 0, bytemuck::bytes_of(&layout));
-                gpu.queue.write_buffer(&slot.kept.arguments, 0, bytemuck::cast_slice(&NONE_KEPT));
-                (slot, index_count, self.bind(gpu, slot, fine))
+                recorder.write(&slot.kept.layout, 0, bytemuck::bytes_of(&layout));
+                recorder.write(&slot.kept.arguments, 0, bytemuck::cast_slice(&NONE_KEPT));
+                (slot, index_count)
             })
             .collect();
         let mut pass = recorder.compute_pass("near_marks");
         pass.set_pipeline(&self.pipeline);
-        for (slot, index_count, group) in &keys {
+        let tiles = fine.near_marks_group.get_or_init(|| self.bind(gpu, &self.tiles_layout, &[&fine.within_reach]));
+        for &(slot, index_count) in &keys {
+            let kept = &slot.kept;
+            let buffers = [&slot.indices, &kept.layout, &kept.arguments, &kept.indices];
+            let group = kept.group.get_or_init(|| self.bind(gpu, &self.kept_layout, &buffers));
             pass.set_bind_group(0, &slot.camera_group, &[]);
             pass.set_bind_group(1, slot.terrain_group.as_ref(), &[]);
-            pass.set_bind_group(2, group, &[]);
+            pass.set_bind_group(2, tiles, &[]);
+            pass.set_bind_group(3, group, &[]);
             let workgroups = (index_count / 3).div_ceil(WORKGROUP);
             pass.dispatch_workgroups(workgroups.min(MOST_GROUPS), workgroups.div_ceil(MOST_GROUPS), 1);
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, slot: &IdealSlot, fine: &FineTarget) -> wgpu::BindGroup {
-        let buffers = [&slot.indices, &fine.within_reach, &slot.kept.layout, &slot.kept.arguments, &slot.kept.indices];
+    fn bind(&self, gpu: &GpuContext, layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
         let entries: Vec<_> =
             (0..).zip(buffers).map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() }).collect();
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("camsim.ideal.near_marks"),
-            layout: &self.layout,
-            entries: &entries,
-        })
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.near_marks"), layout, entries: &entries })
     }
 }

@@ -4,16 +4,16 @@ use camsim_core::scene::{Terrain, TerrainMesh};
 use glam::DVec3;
 
 use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines, near_marks::Kept};
-use crate::{context::GpuContext, layout::ChunkPlace, upload::SceneBuffers};
+use crate::{context::GpuContext, layout::ChunkPlace, recorder::Recorder, upload::SceneBuffers};
 
 /// Room for the indices of a few thousand triangles, bytes.
 const MIN_INDEX_BYTES: u64 = 1 << 16;
 
 /// Writes where the meshes stand from a key.
-pub(super) fn place_meshes(gpu: &GpuContext, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
+pub(super) fn place_meshes(recorder: &mut Recorder<'_>, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
     for (mesh, i) in buffers.meshes.iter().zip(0_u64..) {
         let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
-        gpu.queue.write_buffer(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
+        recorder.write(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
     }
 }
 
@@ -31,19 +31,26 @@ pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePi
 }
 
 /// Writes where the chunks of a key stand and which triangles are drawn; returns the number of their indices.
-pub(super) fn place_terrain(gpu: &GpuContext, slot: &mut IdealSlot, terrain: &Terrain, mesh: &TerrainMesh, base_ned_m: DVec3) -> u32 {
+pub(super) fn place_terrain(
+    gpu: &GpuContext,
+    recorder: &mut Recorder<'_>,
+    slot: &mut IdealSlot,
+    terrain: &Terrain,
+    mesh: &TerrainMesh,
+    base_ned_m: DVec3,
+) -> u32 {
     let place = |&chunk: &u32| {
         let chunk = &terrain.chunks[chunk as usize];
         ChunkPlace { centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(), first_vertex: chunk.first_vertex }
     };
     let places: Vec<ChunkPlace> = mesh.chunks.iter().map(place).collect();
-    gpu.queue.write_buffer(&slot.chunks, 0, bytemuck::cast_slice(&places));
+    recorder.write(&slot.chunks, 0, bytemuck::cast_slice(&places));
     let bytes: &[u8] = bytemuck::cast_slice(&mesh.indices);
     if slot.indices.size() < bytes.len() as u64 {
         slot.indices = index_buffer(gpu, bytes.len() as u64);
         slot.kept = Kept::new(gpu, slot.indices.size());
     }
-    gpu.queue.write_buffer(&slot.indices, 0, bytes);
+    recorder.write(&slot.indices, 0, bytes);
     mesh.indices.len() as u32
 }
 

@@ -6,11 +6,10 @@
 use bytemuck::{Pod, Zeroable};
 use camsim_core::camera::CameraModel;
 pub use camsim_core::camera::INVALID_UV;
-use camsim_core::lens::{Lens, LensModel};
+use camsim_core::lens::{FOLD_RAYS, Lens, LensModel, RADIAL_TABLE_LEN};
 use glam::DVec2;
-use wgpu::util::DeviceExt;
 
-use crate::recorder::Recorder;
+use crate::{ideal::whole, recorder::Recorder};
 
 /// Texel format of a lens map. Half precision would cost 0.3 px.
 pub const LENS_MAP_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
@@ -126,10 +125,41 @@ pub fn shader_source(model: LensModel, start: Start) -> String {
     [common, table, formula, start, main].concat()
 }
 
-/// The pipelines of all variants.
+/// A lens map, and how this stage has come to it so far.
+#[derive(Debug)]
+pub struct LensMap {
+    /// [`LENS_MAP_FORMAT`], the camera's size: written by this stage, then sampled, copied, or given as `warm`.
+    pub texture: wgpu::Texture,
+    /// All of it.
+    pub view: wgpu::TextureView,
+    /// Bind groups by the number of the variant and the map that it started from.
+    groups: Vec<(usize, Option<wgpu::TextureView>, wgpu::BindGroup)>,
+}
+
+impl LensMap {
+    /// An empty map.
+    #[must_use]
+    pub fn new(device: &wgpu::Device, size_px: [u32; 2]) -> Self {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("camsim.lens_inverse.map"),
+            size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: LENS_MAP_FORMAT,
+            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        Self { view: whole(&texture), texture, groups: Vec::new() }
+    }
+}
+
+/// The pipelines of all variants, and what a lens is written to.
 #[derive(Debug)]
 pub struct LensInversePass {
     pipelines: [wgpu::ComputePipeline; VARIANTS.len()],
+    uniform: wgpu::Buffer,
+    table: wgpu::Buffer,
 }
 
 impl LensInversePass {
@@ -149,70 +179,77 @@ impl LensInversePass {
                 cache: None,
             })
         });
-        Self { pipelines }
+        let buffer = |label, size: usize, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let table_bytes = (FOLD_RAYS + RADIAL_TABLE_LEN) * size_of::<f32>();
+        Self {
+            pipelines,
+            uniform: buffer("camsim.lens_inverse.lens", size_of::<LensUniform>(), wgpu::BufferUsages::UNIFORM),
+            table: buffer("camsim.lens_inverse.table", table_bytes, wgpu::BufferUsages::STORAGE),
+        }
     }
 
-    /// An empty lens map for a camera: written by this stage, then sampled, copied, or given as `warm`.
-    pub fn create_map(device: &wgpu::Device, size_px: [u32; 2]) -> wgpu::Texture {
-        device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("camsim.lens_inverse.map"),
-            size: wgpu::Extent3d { width: size_px[0], height: size_px[1], depth_or_array_layers: 1 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: LENS_MAP_FORMAT,
-            usage: wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        })
-    }
-
-    /// Records the pass that writes the lens map of `camera` to `target` ([`LENS_MAP_FORMAT`], the camera's size). `warm`, the map of a
-    /// camera of the same size and nearby zoom, only shortens the way to the same solution: keep it a pure function of scenario and frame
-    /// (a zoom table entry's map, never the previous frame's).
+    /// Records the pass that writes the lens map of `camera` to `target`, a map of the camera's size. `warm`, the map of a camera of the
+    /// same size and nearby zoom, only shortens the way to the same solution: keep it a pure function of scenario and frame (a zoom table
+    /// entry's map, never the previous frame's).
     pub fn encode(
         &self,
         device: &wgpu::Device,
         recorder: &mut Recorder<'_>,
         camera: &CameraModel,
-        target: &wgpu::TextureView,
-        warm: Option<&wgpu::TextureView>,
+        target: &mut LensMap,
+        warm: Option<&LensMap>,
     ) {
         let model = camera.lens.model();
-        let warm = warm.filter(|_| model != LensModel::Pinhole);
-        let pipeline = match (model, warm.is_some()) {
-            (LensModel::Pinhole, _) => &self.pipelines[0],
-            (LensModel::BrownConrady, false) => &self.pipelines[1],
-            (LensModel::BrownConrady, true) => &self.pipelines[2],
-            (LensModel::KannalaBrandt, false) => &self.pipelines[3],
-            (LensModel::KannalaBrandt, true) => &self.pipelines[4],
+        let warm = warm.map(|map| &map.view).filter(|_| model != LensModel::Pinhole);
+        let variant = match (model, warm.is_some()) {
+            (LensModel::Pinhole, _) => 0,
+            (LensModel::BrownConrady, false) => 1,
+            (LensModel::BrownConrady, true) => 2,
+            (LensModel::KannalaBrandt, false) => 3,
+            (LensModel::KannalaBrandt, true) => 4,
         };
-        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("camsim.lens_inverse.lens"),
-            contents: bytemuck::bytes_of(&LensUniform::new(camera)),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
-        let table = lens_table(&camera.lens);
-        let table = (!table.is_empty()).then(|| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("camsim.lens_inverse.table"),
-                contents: bytemuck::cast_slice(&table),
-                usage: wgpu::BufferUsages::STORAGE,
-            })
-        });
-        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-        let mut entries = vec![entry(0, uniform.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(target))];
-        entries.extend(table.as_ref().map(|table| entry(1, table.as_entire_binding())));
-        entries.extend(warm.map(|warm| entry(3, wgpu::BindingResource::TextureView(warm))));
-        let bind_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("camsim.lens_inverse"),
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
+        let pipeline = &self.pipelines[variant];
+        recorder.write(&self.uniform, 0, bytemuck::bytes_of(&LensUniform::new(camera)));
+        recorder.write(&self.table, 0, bytemuck::cast_slice(&lens_table(&camera.lens)));
+        let known = target.groups.iter().position(|(of, from, _)| *of == variant && from.as_ref() == warm);
+        let group = known.unwrap_or_else(|| {
+            let group = self.bind(device, pipeline, model, &target.view, warm);
+            target.groups.push((variant, warm.cloned(), group));
+            target.groups.len() - 1
         });
         let mut pass = recorder.compute_pass("lens_inverse");
         pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &bind_group, &[]);
+        pass.set_bind_group(0, &target.groups[group].2, &[]);
         let [width, height] = camera.size_px;
         pass.dispatch_workgroups(width.div_ceil(WORKGROUP_PX), height.div_ceil(WORKGROUP_PX), 1);
+    }
+
+    fn bind(
+        &self,
+        device: &wgpu::Device,
+        pipeline: &wgpu::ComputePipeline,
+        model: LensModel,
+        target: &wgpu::TextureView,
+        warm: Option<&wgpu::TextureView>,
+    ) -> wgpu::BindGroup {
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let mut entries = vec![entry(0, self.uniform.as_entire_binding()), entry(2, wgpu::BindingResource::TextureView(target))];
+        if model != LensModel::Pinhole {
+            entries.push(entry(1, self.table.as_entire_binding()));
+        }
+        entries.extend(warm.map(|warm| entry(3, wgpu::BindingResource::TextureView(warm))));
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("camsim.lens_inverse"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
     }
 }
 

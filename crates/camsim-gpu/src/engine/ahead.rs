@@ -1,0 +1,157 @@
+//! Frames' plans and what else the host computes for them, made by rayon's threads while the device works on earlier frames. All of it is a
+//! function of sequence and frame number: who computes it, and when, does not show.
+
+use std::{
+    collections::VecDeque,
+    sync::{
+        Arc, Mutex, PoisonError,
+        mpsc::{Receiver, TryRecvError, channel},
+    },
+    time::Instant,
+};
+
+use camsim_core::{
+    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, TemporalStage, line_poses, line_times},
+    pose::CameraPose,
+    scene::{TerrainDetail, TerrainMesh},
+    temporal::IdealGeometry,
+};
+
+use super::ms_since;
+
+/// Frames that are prepared before they are asked for, at most. Each is some megabytes of triangles and poses.
+const MOST_AHEAD: usize = 4;
+
+/// A frame before anything of it is recorded.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    pub plan: FramePlan,
+    /// Triangles of the terrain for each key; none without a terrain.
+    pub meshes: Arc<[TerrainMesh]>,
+    pub lines: Lines,
+    pub plan_ms: f64,
+}
+
+/// Poses of a frame's lines, or their times for the solvers that take the motion as constant.
+#[derive(Debug)]
+pub(super) enum Lines {
+    Poses(LinePoses),
+    Times(LineTimes),
+}
+
+impl Lines {
+    fn of(plan: &FramePlan, planner: &Planner) -> Self {
+        match plan.temporal {
+            TemporalStage::Linear | TemporalStage::Rk2 => Self::Times(line_times(plan)),
+            _ => Self::Poses(line_poses(plan, &planner.sequence().path)),
+        }
+    }
+
+    pub fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Poses(poses) => bytemuck::cast_slice(&poses.entries),
+            Self::Times(times) => bytemuck::cast_slice(&times.dt_s),
+        }
+    }
+}
+
+/// What the choice of triangles depends on.
+#[derive(Debug, PartialEq)]
+struct View {
+    poses: Vec<CameraPose>,
+    ideal: IdealGeometry,
+    terrain_error_px: f64,
+}
+
+/// Prepares frames; the last triangles are kept for as long as they are seen in the same way.
+#[derive(Debug)]
+pub(super) struct Preparer {
+    planner: Arc<Planner>,
+    seen: Mutex<Option<(View, Arc<[TerrainMesh]>)>>,
+}
+
+impl Preparer {
+    pub fn new(planner: Arc<Planner>) -> Self {
+        Self { planner, seen: Mutex::new(None) }
+    }
+
+    fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
+        let begun = Instant::now();
+        let plan = self.planner.plan(frame)?;
+        let meshes = self.meshes(&plan);
+        let lines = Lines::of(&plan, &self.planner);
+        Ok(Prepared { plan, meshes, lines, plan_ms: ms_since(begun) })
+    }
+
+    fn meshes(&self, plan: &FramePlan) -> Arc<[TerrainMesh]> {
+        let poses = plan.keys.iter().map(|key| key.pose).collect();
+        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px };
+        // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
+        let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, meshes)) = seen().as_ref().filter(|(seen, _)| *seen == view) {
+            return meshes.clone();
+        }
+        let focal_px = plan.ideal.focal_px.max_element();
+        let terrain = self.planner.sequence().scene.terrain.iter();
+        let meshes = terrain.flat_map(|terrain| {
+            view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh())
+        });
+        let meshes: Arc<[TerrainMesh]> = meshes.collect();
+        *seen() = Some((view, meshes.clone()));
+        meshes
+    }
+}
+
+/// Frames in the order asked for, each begun before it is taken.
+pub(super) struct Ahead<'a, 'scope, I> {
+    scope: &'a rayon::Scope<'scope>,
+    preparer: &'scope Preparer,
+    frames: I,
+    begun: VecDeque<Receiver<Result<Prepared, PlanError>>>,
+}
+
+impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
+    /// Begins with the first frames. The scope ends when those that have been begun are done.
+    pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
+        let mut ahead = Self { scope, preparer, frames, begun: VecDeque::new() };
+        ahead.begin();
+        ahead
+    }
+
+    /// The next frame; `None` after the last.
+    pub fn next(&mut self) -> Option<Result<Prepared, PlanError>> {
+        let given = self.begun.pop_front()?;
+        // Planning that panics gives no answer; the scope then panics too, when it ends.
+        let prepared = wait(&given)?;
+        self.begin();
+        Some(prepared)
+    }
+
+    fn begin(&mut self) {
+        // One to be taken and one at work at least; more where there are threads for it.
+        let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
+        while self.begun.len() < ahead {
+            let Some(frame) = self.frames.next() else { return };
+            let (give, given) = channel();
+            let preparer = self.preparer;
+            self.scope.spawn(move |_| {
+                // After a fault nobody takes it.
+                let _ = give.send(preparer.prepare(frame));
+            });
+            self.begun.push_back(given);
+        }
+    }
+}
+
+/// Waits. A thread of rayon's own first does what there is to do: it may be the only one.
+fn wait<T>(given: &Receiver<T>) -> Option<T> {
+    loop {
+        match given.try_recv() {
+            Ok(value) => return Some(value),
+            Err(TryRecvError::Disconnected) => return None,
+            Err(TryRecvError::Empty) if rayon::yield_now() == Some(rayon::Yield::Executed) => {}
+            // Not of the pool, or others are at it.
+            Err(TryRecvError::Empty) => return given.recv().ok(),
+        }
+    }
+}
