@@ -283,9 +283,9 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
     let Predicted { resampling_dn, blur_dn, holes, .. } = predicted;
-    let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.2e} %", 100.0 * holes.share));
+    let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.4} %", 100.0 * holes.share));
     console.line(format_args!(
-        "       | holes, hidden from every ideal frame: {expected}, measured {:.2e} % of the picture",
+        "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
         100.0 * hole_share
     ))?;
     if let Some(Picture { psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {

@@ -185,9 +185,9 @@ impl Predicted {
         if let Some(Holes { share, width_px, .. }) = self.holes {
             let of_one = self.holes_of_one.filter(|_| self.holes != self.holes_of_one);
             let beside =
-                of_one.map_or_else(String::new, |one| format!(" (of a single one {:.2e} %, {:.2} px)", 100.0 * one.share, one.width_px));
+                of_one.map_or_else(String::new, |one| format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.share, one.width_px));
             let share = 100.0 * share;
-            writeln!(f, "  holes: {share:.2e} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
+            writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
         writeln!(
             f,

@@ -74,7 +74,7 @@ pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &Q
     if *share == 0.0 {
         return one("no hole was found behind silhouettes".into());
     }
-    one(format!("holes in {:.2e} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
+    one(format!("holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
 }
 
 /// As many ideal frames as `wanted`, or as fit one above the other into a texture; `None` for one.
