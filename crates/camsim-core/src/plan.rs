@@ -26,6 +26,7 @@ mod edges;
 mod error;
 mod forced;
 mod grain;
+mod holes;
 mod keys;
 mod levels;
 mod lines;
@@ -42,6 +43,7 @@ pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
 pub use error::Predicted;
+pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
@@ -305,6 +307,7 @@ impl Planner {
             (blur, edges)
         };
         let expected = prospect.expected(&sampling, blur);
+        let tried = ideal;
         let case = error::Case {
             reach: &reach,
             sequence: &self.sequence,
@@ -312,7 +315,7 @@ impl Planner {
             stamp_s,
             key_s,
             key_pose: &key_pose,
-            ideal: &ideal,
+            ideal: &tried,
             key_twist,
             ray,
             blur,
@@ -321,7 +324,7 @@ impl Planner {
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
             surfaces: &self.surfaces,
         };
-        let error::Choice { way, terrain_error_px, predicted } = error::choose(&case, demanded, &motion, edges);
+        let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion, edges);
         let error::Way { temporal, blur } = way;
         let displaced = Some((temporal, key_twist));
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
@@ -329,7 +332,9 @@ impl Planner {
             ideal = geometry(&one_key, sampling.scale, displaced);
         }
         motion::note_skips(&motion, temporal, &mut skipped);
-        let wanted = keys::wanted(&self.outline, &motion, temporal, edges, quality, &key_pose, &ideal, &mut skipped);
+        let looks_behind = edges != EdgeStage::None && matches!(temporal, TemporalStage::Reproject { .. });
+        predicted.holes_of_one = looks_behind.then(|| truths.holes(&one_key, quality.max_error_px));
+        let wanted = keys::wanted(predicted.holes_of_one.as_ref(), temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(path, window_s, count);
             let ideal = geometry(&keys, sampling.scale, displaced);
@@ -339,6 +344,8 @@ impl Planner {
             ideal = of_keys;
             keys
         });
+        predicted.holes =
+            if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
         self.note_static_skips(&mut skipped, temporal);
         Ok(FramePlan {
             frame,

@@ -21,6 +21,7 @@ use crate::{
 mod clock;
 mod eye;
 mod ground;
+mod holes;
 mod measure;
 mod meshes;
 mod paint;
@@ -30,6 +31,7 @@ mod render;
 use clock::Clock;
 use eye::Eye;
 use ground::Ground;
+pub use holes::{Holes, holes};
 pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, coord_errors, image_errors, silhouettes};
 use meshes::Meshes;
 use paint::Paint;

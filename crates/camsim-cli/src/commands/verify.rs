@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     plan::{FramePlan, Predicted},
-    reference::{CoordErrors, ErrorStats, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, image_errors, silhouettes},
+    reference::{CoordErrors, ErrorStats, Holes, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, holes, image_errors, silhouettes},
     scenario::{Auto, Channel, Solver},
 };
 use camsim_gpu::{
@@ -30,7 +30,7 @@ const DEFAULT_FRAMES: u64 = 5;
 /// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its own instant the plan has looked,
 /// in pixels of the ideal frame. Pixels within 3 px of a silhouette, or whose point the ideal frame does not see, are counted apart. With an
 /// exposure several of its instants are measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is
-/// above quality.max_error_px. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
+/// above quality.max_error_px. Beneath stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
 /// a hundredth is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
 ///
 /// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
@@ -88,6 +88,8 @@ struct Measured {
     judged_by: &'static str,
     falsely_valid: u64,
     missing: u64,
+    /// Share of the picture that shows what no ideal frame sees.
+    hole_share: f64,
 }
 
 #[derive(Serialize)]
@@ -184,6 +186,7 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     let judged = errors.judged();
     let p99_px = judged.p99_px();
     let picture = pictures.then(|| picture(oracle, &first));
+    let hole_share = unseen(oracle, &first.plan).share();
     Ok(Verified {
         frame,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
@@ -201,6 +204,7 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
             },
             falsely_valid: errors.falsely_valid,
             missing: errors.missing,
+            hole_share,
         },
         picture,
     })
@@ -213,6 +217,12 @@ fn phases(plan: &FramePlan) -> Vec<f32> {
     let middle_of = |share: f64| (((share * segments).floor() + 0.5) / segments - 0.5) as f32;
     // Exactly 0 would be mid-exposure.
     [-0.5, middle_of(0.25), middle_of(0.75)].map(|phase| if phase == 0.0 { 1e-4 } else { phase }).to_vec()
+}
+
+/// Over the exposure, if it shows: its middle and both ends, as the probes of the plan look.
+fn unseen(oracle: &Oracle, plan: &FramePlan) -> Holes {
+    let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
+    holes(oracle, plan, phases)
 }
 
 fn at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finished, Failure> {
@@ -254,7 +264,7 @@ const HEADER: &str =
 
 fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
-    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing } = measured;
+    let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, hole_share } = measured;
     let terrain_off = verified.level_of_detail.as_ref().map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
     let share = 100.0 * silhouettes.pixels as f64 / all.pixels.max(1) as f64;
     let verdict = match (verified.kept, verified.as_predicted) {
@@ -272,7 +282,12 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
-    let Predicted { resampling_dn, blur_dn, .. } = predicted;
+    let Predicted { resampling_dn, blur_dn, holes, .. } = predicted;
+    let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.4} %", 100.0 * holes.share));
+    console.line(format_args!(
+        "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
+        100.0 * hole_share
+    ))?;
     if let Some(Picture { psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));

@@ -156,7 +156,7 @@ pub(super) fn ideal_geometry(
             let t_s = mid_s + phase * shutter.exposure_s();
             let pose = path.pose(t_s);
             for w in [0.0, inverse_near] {
-                for key in super::keys::nearest_two(keys, mid_s) {
+                for key in super::keys::nearest_first(keys, mid_s).into_iter().take(2) {
                     let (rotation, shift) = pose.relative_to(&key.pose);
                     let in_key = rotation * uv.extend(1.0) + w * shift;
                     if in_key.z > 0.02 {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, FramePlan, Motion, NodeDepths, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
+use super::{BlurStage, EdgeStage, FramePlan, Holes, Motion, NodeDepths, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
 use crate::{
     scenario::Preset,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
@@ -195,6 +195,13 @@ impl Predicted {
         }
         if silhouette_share > 0.0 {
             writeln!(f, "  apart: at least {:.0} % of the pixels, at a step or fold of depth", 100.0 * silhouette_share)?;
+        }
+        if let Some(Holes { share, width_px, .. }) = self.holes {
+            let of_one = self.holes_of_one.filter(|_| self.holes != self.holes_of_one);
+            let beside =
+                of_one.map_or_else(String::new, |one| format!(" (of a single one {:.4} %, {:.2} px)", 100.0 * one.share, one.width_px));
+            let share = 100.0 * share;
+            writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
         writeln!(
             f,

@@ -113,15 +113,6 @@ impl SceneOutline {
         Self { chunks, blocks, meshes }
     }
 
-    /// Bound on the distance of any surface in view, metres; `None` without one.
-    pub(super) fn farthest_m(&self, pose: &CameraPose, tangents: [f64; 4]) -> Option<f64> {
-        let frustum = Frustum::new(pose, tangents);
-        let boxes = self.chunks.iter().map(|patch| &patch.bounds).chain(self.meshes.iter().map(|mesh| &mesh.bounds));
-        let camera = pose.position_ned_m;
-        let corner_m = |bounds: &Aabb| (bounds.max - camera).abs().max((bounds.min - camera).abs()).length();
-        boxes.filter(|bounds| frustum.may_see(bounds)).map(corner_m).reduce(f64::max)
-    }
-
     /// Whether any mesh can be seen from within `travel_m` of `pose`.
     fn meshes_in_view(&self, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> bool {
         let frustum = Frustum::new(pose, tangents);

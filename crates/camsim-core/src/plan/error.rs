@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    BlurStage, EdgeStage, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
+    BlurStage, EdgeStage, Holes, KeyFrame, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     levels::Expected,
-    probes::Probe,
+    probes::{Probe, spacing_px},
     rounding::Rounding,
     surfaces::Surfaces,
 };
@@ -78,6 +78,10 @@ pub struct Predicted {
     pub silhouette_share: f64,
     /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
     pub void_share: f64,
+    /// What no ideal frame sees, and what a single one would not; `None` where nobody looks behind silhouettes.
+    pub holes: Option<Holes>,
+    /// See above.
+    pub holes_of_one: Option<Holes>,
     /// Probes with a source.
     pub probes: u32,
     /// Whether `total_px` is within `quality.max_error_px`, and no more than a hundredth of the probes are void.
@@ -106,10 +110,11 @@ pub(super) struct Case<'a> {
 }
 
 /// What was chosen, and what it leads to.
-pub(super) struct Choice {
+pub(super) struct Choice<'a> {
     pub way: Way,
     pub terrain_error_px: f64,
     pub predicted: Predicted,
+    pub truths: Truths<'a>,
 }
 
 /// A temporal inverse, and the exposure that it is used for.
@@ -120,7 +125,7 @@ pub(super) struct Way {
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
-pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &Motion, edges: EdgeStage) -> Choice {
+pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, motion: &Motion, edges: EdgeStage) -> Choice<'a> {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
@@ -141,9 +146,9 @@ pub(super) fn choose(case: &Case<'_>, demanded: Option<TemporalStage>, motion: &
     };
     let mut predicted = forecast.predict(case, way);
     if edges != EdgeStage::None {
-        predicted.silhouette_share = forecast.truths.silhouette_share();
+        predicted.silhouette_share = truths.silhouette_share();
     }
-    Choice { way, terrain_error_px, predicted }
+    Choice { way, terrain_error_px, predicted, truths }
 }
 
 impl Case<'_> {
@@ -202,7 +207,7 @@ impl Case<'_> {
 }
 
 /// Where the probes of one frame look.
-struct Truths<'a> {
+pub(super) struct Truths<'a> {
     camera: &'a CameraModel,
     ray: RayStage,
     trial: Trial<'a>,
@@ -248,7 +253,14 @@ impl<'a> Truths<'a> {
         apart as f64 / asked.len().max(1) as f64
     }
 
-    fn forecast(self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
+    /// What `keys` do not see.
+    pub fn holes(&self, keys: &[KeyFrame], max_error_px: f64) -> Holes {
+        let looked = self.looked.par_iter().map(|Looked { probe, truth, .. }| (probe, truth));
+        let ideal_from_camera = self.trial.ideal.focal_px.x / self.camera.focal_px.x;
+        Holes::new(&self.trial, looked, keys, ideal_from_camera * spacing_px(self.camera), max_error_px)
+    }
+
+    fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
         let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
         Forecast { outcomes, detail, truths: self, between_px: OnceLock::new() }
@@ -257,7 +269,7 @@ impl<'a> Truths<'a> {
 
 /// Dry runs of one frame.
 struct Forecast<'a> {
-    truths: Truths<'a>,
+    truths: &'a Truths<'a>,
     detail: Option<&'a TerrainDetail<'a>>,
     /// One for each of the probes.
     outcomes: Vec<Outcome>,
@@ -356,6 +368,8 @@ impl Forecast<'_> {
             total_px,
             silhouette_share: 0.0,
             void_share,
+            holes: None,
+            holes_of_one: None,
             probes: probes as u32,
             kept,
             in_the_way,
@@ -363,14 +377,14 @@ impl Forecast<'_> {
     }
 
     fn rounding(&self, Looked { probe, truth, .. }: &Looked, run: &Outcome, stage: TemporalStage) -> Rounding {
-        let Truths { camera, ray, trial, .. } = &self.truths;
+        let Truths { camera, ray, trial, .. } = self.truths;
         Rounding::new(probe, truth.at_px, run.parallax_px, camera, trial.ideal, *ray, stage)
     }
 
     /// Largest miss of the straight stretches between the exposure's nodes.
     fn nodes_px(&self, blur: Option<BlurStage>) -> f64 {
         let Some(segments) = blur.map(|blur| blur.nodes - 1) else { return 0.0 };
-        let Truths { trial, looked, .. } = &self.truths;
+        let Truths { trial, looked, .. } = self.truths;
         let looked_at = CHORD_SEGMENTS.min(segments);
         let every = looked.len().div_ceil(CHORD_PROBES).max(1);
         let miss = |Looked { probe, truth, .. }: &Looked| {

@@ -2,8 +2,8 @@
 //! silhouette; a second one, at another instant, sees most of it.
 
 use super::{
-    EdgeStage, Motion, Skip, TemporalStage,
-    edges::{FINE_PIXEL_BYTES, SceneOutline, scale_of},
+    EdgeStage, Holes, Skip, TemporalStage,
+    edges::{FINE_PIXEL_BYTES, scale_of},
 };
 use crate::{mount::CameraPath, pose::CameraPose, scenario::QualitySpec, temporal::IdealGeometry};
 
@@ -15,11 +15,10 @@ const PIXEL_BYTES: u64 = 12;
 const MAX_BYTES: u64 = 2 << 30;
 /// Allocated heights are multiples of this.
 pub const SIZE_QUANTUM_PX: u32 = 64;
-/// Strips of unseen surface beside silhouettes, ideal pixels, up to which the surface beside them may stand in.
-const HOLE_PX: f64 = 4.0;
-/// The same where `quality.max_error_dn` asks for more than the default.
-const FINE_HOLE_PX: f64 = 2.0;
-const DEFAULT_DN: f64 = 1.0;
+/// Part of a tolerance that holes may take.
+const HOLES_SHARE: f64 = 0.5;
+/// Of the pixels that `quality.max_error_px` is kept in.
+const PERCENTILE: f64 = 0.99;
 
 /// Instant and pose of an ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,27 +38,20 @@ pub(super) fn spread(path: &CameraPath, [first_s, last_s]: [f64; 2], count: u32)
     (0..count.max(1)).map(at).map(|t_s| KeyFrame { t_s, pose: path.pose(t_s) }).collect()
 }
 
-/// The one or two keys that are nearest to an instant: a line's own, and the one that fills its holes first.
-pub(super) fn nearest_two(keys: &[KeyFrame], t_s: f64) -> impl Iterator<Item = &KeyFrame> {
+/// In the order of their distance from an instant: a line's own key, the one that fills its holes first, and so on.
+pub(super) fn nearest_first(keys: &[KeyFrame], t_s: f64) -> Vec<&KeyFrame> {
     let mut order: Vec<&KeyFrame> = keys.iter().collect();
     order.sort_by(|a, b| (a.t_s - t_s).abs().total_cmp(&(b.t_s - t_s).abs()));
-    order.into_iter().take(2)
+    order
 }
 
-/// Number of ideal frames that the frame asks for.
+/// Number of ideal frames that the frame asks for; `holes` is what a single one does not see.
 ///
-/// What the line at the end of the window sees and the middle one does not is a strip of `f |t| (w_max - w_min)` px beside a silhouette
-/// (w = inverse depth of surfaces in view; sky behind it is one colour and needs no second look).
-pub(super) fn wanted(
-    outline: &SceneOutline,
-    motion: &Motion,
-    temporal: TemporalStage,
-    edges: EdgeStage,
-    quality: &QualitySpec,
-    pose: &CameraPose,
-    ideal: &IdealGeometry,
-    skipped: &mut Vec<Skip>,
-) -> u32 {
+/// A second one mends most of the holes: only lines near the ends of the window see strips then, and half as wide ones. It takes as long as
+/// the first, so it is for holes that would be a large part of either tolerance: of `quality.max_error_dn` by their colours, which is an RMS
+/// over the picture, or of `quality.max_error_px` by their coordinates, which are off by as much as the strips are wide, and may be so in
+/// a hundredth of the pixels.
+pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> u32 {
     let mut one = |reason: String| {
         skipped.push(Skip { what: "second ideal frame", reason });
         1
@@ -73,17 +65,16 @@ pub(super) fn wanted(
     if let Some(count) = quality.key_frames.value() {
         return if count <= 1 { one("quality.key_frames is 1".into()) } else { count.min(MAX_KEYS) };
     }
-    if edges == EdgeStage::None {
+    let Some(Holes { share, width_px, wide_share, error_dn }) = holes else {
         return one("no silhouette is seen sample by sample".into());
+    };
+    if *error_dn > HOLES_SHARE * quality.max_error_dn || *wide_share > HOLES_SHARE * (1.0 - PERCENTILE) {
+        return 2;
     }
-    let far_w = outline.farthest_m(pose, ideal.tangents()).map_or(0.0, f64::recip);
-    // `parallax_px` is that of the nearest surface, f |t| w_max.
-    let hole_px = motion.parallax_px * (1.0 - far_w * motion.nearest_m).max(0.0);
-    let limit_px = if quality.max_error_dn < DEFAULT_DN { FINE_HOLE_PX } else { HOLE_PX };
-    if hole_px <= limit_px {
-        return one(format!("strips that only other lines see beside silhouettes are at most {hole_px:.2} px wide"));
+    if *share == 0.0 {
+        return one("no hole was found behind silhouettes".into());
     }
-    2
+    one(format!("holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
 }
 
 /// As many ideal frames as `wanted`, or as fit one above the other into a texture; `None` for one.
@@ -125,11 +116,11 @@ mod tests {
     #[test]
     fn a_line_uses_the_keys_beside_it() {
         let keys = [0.125, 0.375, 0.625, 0.875].map(key);
-        let times = |t_s: f64| nearest_two(&keys, t_s).map(|key| key.t_s).collect::<Vec<_>>();
-        assert_eq!(times(0.0), [0.125, 0.375]);
-        assert_eq!(times(0.45), [0.375, 0.625]);
-        assert_eq!(times(2.0), [0.875, 0.625]);
-        assert_eq!(nearest_two(&keys[..1], 0.3).count(), 1);
+        let times = |t_s: f64| nearest_first(&keys, t_s).into_iter().map(|key| key.t_s).collect::<Vec<_>>();
+        assert_eq!(times(0.0), [0.125, 0.375, 0.625, 0.875]);
+        assert_eq!(times(0.45), [0.375, 0.625, 0.125, 0.875]);
+        assert_eq!(times(2.0), [0.875, 0.625, 0.375, 0.125]);
+        assert_eq!(nearest_first(&keys[..1], 0.3).len(), 1);
     }
 
     #[test]

@@ -38,6 +38,12 @@ pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
     inside.chain(corners).filter_map(|pixel| probe(camera, pixel)).collect()
 }
 
+/// Side of the part of the image that a probe stands for, pixels.
+pub(super) fn spacing_px(camera: &CameraModel) -> f64 {
+    let [width, height] = [0, 1].map(|axis: usize| (f64::from(camera.size_px[axis]) / f64::from(GRID[axis])).max(1.0));
+    (width * height).sqrt()
+}
+
 fn probe(camera: &CameraModel, pixel: [u32; 2]) -> Option<Probe> {
     let distorted = camera.distorted_from_pixel(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])));
     let uv = camera.lens.undistort(distorted)?;

@@ -6,6 +6,7 @@ mod casting;
 mod closed_form;
 mod convergence;
 mod fixtures;
+mod holes;
 mod hostile;
 mod measuring;
 mod planted_faults;

@@ -83,7 +83,7 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     }
     if case.has_houses() {
         if matches!(case.group, Group::Buildings | Group::LongWindow | Group::AllEffects) {
-            for keys in [2, 3] {
+            for keys in [1, 2, 3] {
                 row(&format!("{keys} key frames"), Family::KeyFrames, &|scenario| scenario.quality.key_frames = Auto::Value(keys));
             }
         }
