@@ -5,11 +5,8 @@ use glam::{DVec2, DVec3};
 
 use super::lines::{EdgeLine, edge_line};
 
-/// Depths this near to each other, relative to the nearer one, are of one surface.
-const SURFACE_STEP: f64 = 0.005;
-/// A slope has the mean of two depths half-way between their places, a step one of the two: off by half of their difference. Samples
-/// stand up to half a fine pixel beside the places that they speak for, so a slope is off by some too.
-const HALF_WAY: f64 = 0.35;
+/// Depths this near to each other, relative to the nearest, are of one surface.
+const ONE_SURFACE: f64 = 0.02;
 /// Bilinear weight from which pixels of the same surface give its colour: less is lost in single precision, far out in the frame.
 const LEAST_WEIGHT: f64 = 1e-3;
 
@@ -113,8 +110,8 @@ impl FineImage<'_> {
     }
 
     /// Linear R G B at a position of the surface that is seen there: that of the sample; or, where samples have none, bilinear between
-    /// those of the four pixels around it that show the same surface as [`FineImage::inverse_depth`] has; where none does, the nearest in
-    /// depth of the sixteen around it.
+    /// those of the four pixels around it, or, where those show two surfaces, of those on the side of the mean of their depths that
+    /// [`FineImage::inverse_depth`] is on; where that is none, the nearest in depth of the sixteen around it.
     #[must_use]
     pub fn color(&self, at_px: DVec2) -> DVec3 {
         if let Some(&color) = self.sample_colors.get(self.sample(at_px)) {
@@ -122,18 +119,18 @@ impl FineImage<'_> {
         }
         let depth = self.inverse_depth(at_px);
         let around = self.around(at_px);
-        let (base, t) = (around.base, around.t);
-        let at = base + t;
+        let t = around.t;
         let centre = |x, y| self.centre(&around, x, y);
+        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (x, y, centre(x, y)));
+        let (low, high) =
+            four.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), (_, _, c)| (low.min(c.inverse_depth), high.max(c.inverse_depth)));
+        let between = 0.5 * (low + high);
+        let one_surface = low > (1.0 - ONE_SURFACE) * high;
         let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
-        for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let Centre { inverse_depth: other, color } = centre(x, y);
-            let off = (other - depth).abs();
-            let half_way_px = 0.5 * (at + base + DVec2::new(f64::from(x), f64::from(y)));
-            let slopes = || (self.inverse_depth(half_way_px) - 0.5 * (other + depth)).abs() < HALF_WAY * off;
-            if off <= SURFACE_STEP * other.max(depth) || slopes() {
+        for (x, y, c) in four {
+            if one_surface || (c.inverse_depth > between) == (depth > between) {
                 let share = if x == 1 { t.x } else { 1.0 - t.x } * if y == 1 { t.y } else { 1.0 - t.y };
-                sum += share * color;
+                sum += share * c.color;
                 weight += share;
             }
         }
