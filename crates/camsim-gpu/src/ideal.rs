@@ -122,14 +122,21 @@ pub fn key_rows(ideal: &IdealGeometry) -> u32 {
 /// Pipelines of the ideal render.
 #[derive(Debug)]
 pub struct IdealPass {
-    marks: MarksPass,
-    near_marks: NearMarksPass,
+    /// Compiled when a silhouette is first in view.
+    silhouettes: Option<SilhouettePasses>,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
     /// Compiled when first needed.
     pipelines: HashMap<SurfaceKey, SurfacePipelines>,
     color_format: wgpu::TextureFormat,
+}
+
+/// What frames with silhouettes take besides drawing.
+#[derive(Debug)]
+struct SilhouettePasses {
+    marks: MarksPass,
+    near_marks: NearMarksPass,
 }
 
 /// Which pipelines draw surfaces.
@@ -185,8 +192,7 @@ impl IdealPass {
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         Ok(Self {
-            marks: MarksPass::new(gpu)?,
-            near_marks: NearMarksPass::new(gpu, &camera_layout, &terrain_layout)?,
+            silhouettes: None,
             camera_layout,
             terrain_layout,
             mesh_layout,
@@ -288,6 +294,10 @@ impl IdealPass {
                 self.pipelines.insert(key, self.surface_pipelines(gpu, key)?);
             }
         }
+        if fine.is_some() && self.silhouettes.is_none() {
+            let near_marks = NearMarksPass::new(gpu, &self.camera_layout, &self.terrain_layout)?;
+            self.silhouettes = Some(SilhouettePasses { marks: MarksPass::new(gpu)?, near_marks });
+        }
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
@@ -309,10 +319,13 @@ impl IdealPass {
             recorder.render_pass("ideal", Some(color_attachment(&target.drawn_color, scene)), Some(depth_attachment(&target.drawn_depth)));
         self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
         drop(pass);
-        if let (Some(fine), Some(key), EdgeStage::Supersampled { thin, .. }) = (&target.fine, fine, plan.edges) {
+        if let (Some(fine), Some(key), Some(passes), EdgeStage::Supersampled { thin, .. }) =
+            (&target.fine, fine, &self.silhouettes, plan.edges)
+        {
+            let SilhouettePasses { marks, near_marks } = passes;
             if !thin {
-                self.marks.mark(gpu, recorder, plan, target, fine, false);
-                self.near_marks.encode(gpu, recorder, plan, target.allocated_px[0].div_ceil(TILE_PX), slots, &index_counts, fine);
+                marks.mark(gpu, recorder, plan, target, fine, false);
+                near_marks.encode(gpu, recorder, plan, target.allocated_px[0].div_ceil(TILE_PX), slots, &index_counts, fine);
             }
             let color = fine.color_view.as_ref().map(|view| color_attachment(view, scene));
             let mut pass = recorder.render_pass("ideal_fine", color, Some(depth_attachment(&fine.depth_view)));
@@ -322,10 +335,10 @@ impl IdealPass {
             });
             drop(pass);
             if thin {
-                self.marks.mark(gpu, recorder, plan, target, fine, true);
+                marks.mark(gpu, recorder, plan, target, fine, true);
             }
-            self.marks.stamp(gpu, recorder, target, fine);
-            self.marks.borders(gpu, recorder, plan, target, fine);
+            marks.stamp(gpu, recorder, target, fine);
+            marks.borders(gpu, recorder, plan, target, fine);
         }
         Ok(middle_lod)
     }
