@@ -10,7 +10,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{EdgeStage, FramePlan, PlanError, Planner, RayStage},
+    plan::{EdgeStage, FramePlan, Planner, RayStage},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -34,10 +34,13 @@ use crate::{
 };
 
 mod ahead;
+mod error;
 mod readback;
 mod slot;
 
 use ahead::{Ahead, Prepared, Preparer};
+pub use error::RenderError;
+use error::RenderErrorBase;
 use readback::{Output, coords, read_mapped, read_texture};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
@@ -47,23 +50,6 @@ const FRAMES_IN_FLIGHT: usize = 2;
 const MAX_TARGETS: usize = 4;
 /// The same for supersampled ones, which take 16 times the memory.
 const MAX_FINE_TARGETS: usize = 2;
-
-/// Errors of rendering; `E` is the sink's own.
-#[derive(Debug, thiserror::Error)]
-pub enum RenderError<E: std::error::Error + 'static> {
-    /// The device.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// Planning.
-    #[error(transparent)]
-    Plan(#[from] PlanError),
-    /// The shader files.
-    #[error(transparent)]
-    Shader(#[from] ComposeError),
-    /// Whoever takes the frames.
-    #[error(transparent)]
-    Sink(E),
-}
 
 /// The opened device.
 #[derive(Debug)]
@@ -509,18 +495,4 @@ impl Session<'_> {
 
 fn ms_since(begun: Instant) -> f64 {
     begun.elapsed().as_secs_f64() * 1e3
-}
-
-/// Errors before a sink is involved.
-type RenderErrorBase = RenderError<std::convert::Infallible>;
-
-impl<E: std::error::Error + 'static> RenderError<E> {
-    fn lift(base: RenderErrorBase) -> Self {
-        match base {
-            RenderError::Gpu(error) => Self::Gpu(error),
-            RenderError::Plan(error) => Self::Plan(error),
-            RenderError::Shader(error) => Self::Shader(error),
-            RenderError::Sink(never) => match never {},
-        }
-    }
 }

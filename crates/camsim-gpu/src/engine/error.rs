@@ -1,0 +1,37 @@
+//! What can go wrong while frames are rendered.
+
+use camsim_core::plan::PlanError;
+
+use crate::{context::GpuError, shaders::ComposeError};
+
+/// Errors of rendering; `E` is the sink's own.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError<E: std::error::Error + 'static> {
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// Planning.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The shader files.
+    #[error(transparent)]
+    Shader(#[from] ComposeError),
+    /// Whoever takes the frames.
+    #[error(transparent)]
+    Sink(E),
+}
+
+/// Errors before a sink is involved.
+pub(super) type RenderErrorBase = RenderError<std::convert::Infallible>;
+
+impl<E: std::error::Error + 'static> RenderError<E> {
+    /// As the error of a sink of another kind.
+    pub(super) fn lift(base: RenderErrorBase) -> Self {
+        match base {
+            RenderError::Gpu(error) => Self::Gpu(error),
+            RenderError::Plan(error) => Self::Plan(error),
+            RenderError::Shader(error) => Self::Shader(error),
+            RenderError::Sink(never) => match never {},
+        }
+    }
+}
