@@ -7,6 +7,3 @@ struct MarkedTile {
     bits_low: u32,
     bits_high: u32,
 }
-
-// Workgroups along x at most: every adapter has 65535 along each axis.
-const MOST_GROUPS: u32 = 32768u;

@@ -1,5 +1,6 @@
 // Marks the pixels of an ideal frame that, with their neighbours, show more than one surface, and lists the tiles of 8x8 pixels that have
 // any. Twin of `steps`: camsim_core::temporal::edges.
+#import common/dispatch.wgsl
 #import ideal/marked_tiles.wgsl
 
 @group(0) @binding(0) var centre_depth: texture_depth_2d;

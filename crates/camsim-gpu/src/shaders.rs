@@ -14,6 +14,7 @@ macro_rules! embedded {
 }
 
 embedded![
+    "common/dispatch.wgsl",
     "common/frame.wgsl",
     "common/noise.wgsl",
     "ideal/borders.wgsl",

@@ -1,5 +1,6 @@
 // Pixels that may see a silhouette are listed for the pass after this one, which gives them rays of their own: they are few and lie in strips,
 // and side by side in a list they keep a processor's lanes busy.
+#import common/dispatch.wgsl
 #import reverse/edges/near.wgsl
 
 struct Listed {
@@ -13,9 +14,6 @@ struct Listed {
 }
 
 @group(3) @binding(2) var<storage, read_write> listed: Listed;
-
-// Workgroups along x at most: every adapter has 65535 along each axis.
-const MOST_GROUPS: u32 = 32768u;
 
 // Whether rays of this pixel may meet another surface than the plain gather did.
 fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
