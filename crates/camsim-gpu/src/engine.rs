@@ -21,7 +21,7 @@ use wgpu::util::DeviceExt;
 
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
-    ideal::{IdealPass, IdealTarget, STORED_FORMAT},
+    ideal::{IdealPass, IdealTarget},
     layout::Truth,
     recorder::{PassClock, PassTime, Recorder},
     reverse::{
@@ -35,13 +35,15 @@ use crate::{
 
 mod ahead;
 mod error;
+mod inspect;
 mod readback;
 mod slot;
 
 use ahead::{Ahead, Prepared, Preparer};
 pub use error::RenderError;
 use error::RenderErrorBase;
-use readback::{Output, coords, read_mapped, read_texture};
+pub use inspect::IdealImages;
+use readback::{Output, coords, read_mapped};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
@@ -158,6 +160,8 @@ struct Drawn {
     edges: EdgeStage,
     terrain_error_px: f64,
     target: usize,
+    /// The slot of its frame.
+    slot: usize,
     lod: LodSelection,
 }
 
@@ -192,9 +196,6 @@ struct InFlight {
     lod: LodSelection,
     times: FrameTimes,
 }
-
-/// Geometry, linear R G B A (A is 0 where a silhouette is marked), and inverse depth in 1/m of an ideal frame, row-major.
-pub type IdealImages = (IdealGeometry, Vec<f32>, Vec<f32>);
 
 /// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -286,28 +287,6 @@ impl Session<'_> {
                 }
             }
         })
-    }
-
-    /// The ideal frame that the last rendered frame was gathered from (of several the first): linear R G B A (with the paper preset sRGB
-    /// values as stored) and inverse depth (1/m), row-major. For tests and for looking at stages one by one.
-    ///
-    /// # Errors
-    /// Device faults; `None` before the first frame.
-    pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
-        let Some(drawn) = &self.drawn else { return Ok(None) };
-        let target = &self.targets[drawn.target].ideal;
-        let [width, height] = drawn.ideal.size_px;
-        let color: Vec<f32> = if target.color.format() == STORED_FORMAT {
-            let bytes = read_texture::<[u8; 4]>(&self.engine.gpu, &target.color, width, height)?;
-            bytes.iter().flatten().map(|v| f32::from(*v) / 255.0).collect()
-        } else {
-            let halves = read_texture::<[half::f16; 4]>(&self.engine.gpu, &target.color, width, height)?;
-            halves.iter().flatten().map(|v| v.to_f32()).collect()
-        };
-        let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height)?;
-        self.engine.check()?;
-        let near_m = camsim_core::plan::NEAR_M as f32;
-        Ok(Some((drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())))
     }
 
     /// Records and submits a frame.
@@ -420,7 +399,8 @@ impl Session<'_> {
             &prepared.meshes,
             &self.targets[target].ideal,
         )?;
-        self.drawn = Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, lod });
+        self.drawn =
+            Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, slot, lod });
         Ok(())
     }
 

@@ -172,6 +172,13 @@ pub struct IdealSlot {
     mesh_groups: Vec<wgpu::BindGroup>,
 }
 
+impl IdealSlot {
+    /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their number.
+    pub(crate) fn near_marks(&self) -> &wgpu::Buffer {
+        &self.kept.arguments
+    }
+}
+
 impl IdealPass {
     /// Compiles the pipelines.
     ///

@@ -154,6 +154,28 @@ fn ridges_before_ridges_and_sky() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
+    let mut scenario = camera();
+    scenario.camera.size_px = [640, 480];
+    scenario.camera.focal_px = [512.0, 512.0];
+    scenario.camera.mount.angles_deg = [4.0, -35.0, 0.0];
+    let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
+    let engine = engine();
+    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    let mut all = 0;
+    let mut count = |done: Finished| {
+        assert!(matches!(done.plan.edges, EdgeStage::Supersampled { thin: false, .. }), "{:?}", done.plan.edges);
+        all = done.lod.triangles;
+        Ok(())
+    };
+    session.render::<std::convert::Infallible>([0], &mut count).expect("render");
+    let near = session.triangles_near_marks().expect("readable").expect("drawn");
+    eprintln!("{near} of {all} triangles");
+    assert!(near > 0 && 2 * near < all, "{near} of {all}");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_surface_that_fills_the_view_is_not_supersampled() {
     let sequence = sequence(camera(), steady(120.0, 0.0, EAST, TURN), pattern(6000.0));
     let done = render(&engine(), &sequence, &[Channel::Color], 0);

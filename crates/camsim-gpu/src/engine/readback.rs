@@ -53,6 +53,22 @@ pub(super) fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
         .collect()
 }
 
+/// All of a buffer.
+pub(super) fn read_buffer<T: bytemuck::Pod>(gpu: &GpuContext, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
+    let on_host = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("camsim.read_buffer"),
+        size: buffer.size(),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_buffer") });
+    encoder.copy_buffer_to_buffer(buffer, 0, &on_host, 0, buffer.size());
+    gpu.queue.submit([encoder.finish()]);
+    on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
+    read_mapped(&on_host)
+}
+
 /// The top-left `width` x `height` texels of a texture.
 pub(super) fn read_texture<T: bytemuck::Pod>(
     gpu: &GpuContext,

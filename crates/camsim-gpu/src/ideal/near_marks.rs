@@ -49,7 +49,11 @@ impl Kept {
         let (storage, written) = (wgpu::BufferUsages::STORAGE, wgpu::BufferUsages::COPY_DST);
         Self {
             layout: create("camsim.ideal.key_layout", size_of::<KeyLayout>() as u64, wgpu::BufferUsages::UNIFORM | written),
-            arguments: create("camsim.ideal.kept", size_of_val(&NONE_KEPT) as u64, storage | wgpu::BufferUsages::INDIRECT | written),
+            arguments: create(
+                "camsim.ideal.kept",
+                size_of_val(&NONE_KEPT) as u64,
+                storage | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_SRC | written,
+            ),
             indices: create("camsim.ideal.kept_indices", index_bytes, storage | wgpu::BufferUsages::INDEX),
             group: OnceLock::new(),
         }
