@@ -35,7 +35,8 @@ struct Frame {
     frame_number: u32,
     // 1: one luminance value for all three channels.
     mono: u32,
-    pad1: u32,
+    // The path over the exposure goes through every so many poses.
+    node_stride: u32,
     // Supersampled ideal frame: fine pixels along a side of an ideal pixel; rays of an output pixel that sees a silhouette.
     edge_scale: u32,
     edge_samples: u32,

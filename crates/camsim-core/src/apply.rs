@@ -17,6 +17,7 @@ use crate::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::{photometric, vignette_weights},
+    plan::PathStage,
     scenario::{CameraSpec, Preset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
@@ -285,7 +286,7 @@ impl<'a> Pipeline<'a> {
         let area = self.footprint(uv, dt_s, &middle);
         let exposure_s = self.shutter.exposure_s();
         if self.nodes < 2 {
-            return Some(gather(&[middle.at_px], &area, &self.color(), SAMPLES_PER_PX, MAX_SAMPLES));
+            return Some(gather(&[middle.at_px], PathStage::Straight, &area, &self.color(), SAMPLES_PER_PX, MAX_SAMPLES));
         }
         let at_node = |k: u32| dt_s + exposure_s * (f64::from(k) / f64::from(self.nodes - 1) - 0.5);
         let sources: Option<Vec<Source>> = (0..self.nodes).map(|k| self.source_of_ray(uv, at_node(k))).collect();
@@ -296,7 +297,7 @@ impl<'a> Pipeline<'a> {
             None => (SAMPLES_PER_PX, MAX_SAMPLES),
         };
         if !self.meets_edge(dt_s, &sources, middle.at_px) {
-            return Some(gather(&nodes_px, &area, &self.color(), per_px, cap));
+            return Some(gather(&nodes_px, PathStage::Straight, &area, &self.color(), per_px, cap));
         }
         // Surfaces that part over the exposure: every sample finds its own.
         let length_px: f64 = nodes_px.windows(2).map(|ends| ends[0].distance(ends[1])).sum();

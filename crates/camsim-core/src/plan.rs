@@ -24,6 +24,7 @@ mod describe;
 mod dry_run;
 mod edges;
 mod error;
+mod exposure;
 mod forced;
 mod grain;
 mod holes;
@@ -47,7 +48,7 @@ pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
-pub use stages::{BlurStage, NodeDepths, RayStage, SurfaceReads, TemporalStage};
+pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, TemporalStage};
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
@@ -273,8 +274,13 @@ impl Planner {
         let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale, displaced) };
         let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
         let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, &self.surfaces);
-        let nodes_of = |motion: &Motion, ideal: &IdealGeometry, skipped: &mut Vec<Skip>| {
-            motion::exposure_nodes(motion, quality, &reach, path, &self.shutter, stamp_s, ideal, skipped)
+        let exposed = |motion: &Motion, ideal: &IdealGeometry| exposure::Exposed {
+            reach: &reach,
+            path,
+            shutter: &self.shutter,
+            stamp_s,
+            focal_px: ideal.focal_px,
+            motion: *motion,
         };
         let mut motion = measure(&ideal);
         let sampling = if is_paper {
@@ -282,8 +288,9 @@ impl Planner {
         } else {
             let side_px = ideal.size_px[0].max(ideal.size_px[1]);
             let fits = |scale: f64| f64::from(side_px) * scale / least_scale < f64::from(self.max_side_px);
-            let nodes = nodes_of(&motion, &ideal, &mut Vec::new()).unwrap_or(1);
-            prospect.choose(quality, least_scale, nodes, fits)
+            let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+            let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale);
+            prospect.choose(quality, least_scale, ideal_share, exposed(&motion, &ideal).path(quality, &mut Vec::new()), fits)
         };
         if sampling.scale != least_scale && !is_paper {
             ideal = geometry(&one_key, sampling.scale, displaced);
@@ -299,12 +306,14 @@ impl Planner {
             skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
             (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
-            let nodes = nodes_of(&motion, &ideal, &mut skipped);
-            let blur = nodes.map(|nodes| sampling.blur_stage(nodes, quality, motion.blur_px));
-            let blur = demanded.map_or(blur, |stage| forced::blur_stage(stage, blur, &sampling, quality, &motion));
-            let travel_m = motion.travel_m;
+            let exposed = exposed(&motion, &ideal);
+            let exposure = exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
+            let staged = |exposure| sampling.blur_stage(exposure, quality, motion.blur_px);
+            let (blur, travel_m) = (exposure.map(staged), motion.travel_m);
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
-            (blur, edges)
+            let looks_behind = edges != EdgeStage::None && demanded != Some(TemporalStage::Linear);
+            let with_poses = |exposure| if looks_behind { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
+            (exposure.map(with_poses).map(staged), edges)
         };
         let expected = prospect.expected(&sampling, blur);
         let tried = ideal;
@@ -319,7 +328,7 @@ impl Planner {
             key_twist,
             ray,
             blur,
-            straight_blur: blur.map(|_| sampling.blur_stage(2, quality, motion.blur_px)),
+            straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
             surfaces: &self.surfaces,

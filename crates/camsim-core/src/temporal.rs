@@ -6,7 +6,7 @@
 use glam::{DMat3, DVec2, DVec3};
 use serde::Serialize;
 
-use crate::plan::NodeDepths;
+use crate::plan::{NodeDepths, PathStage};
 
 pub mod displacement;
 pub mod edges;
@@ -14,6 +14,7 @@ pub mod fine;
 pub mod lines;
 pub mod marks;
 pub mod paper;
+pub mod path;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -347,28 +348,30 @@ fn spread(side: DVec2, taps: u32) -> DVec2 {
     side * ((length2 - TENT_PX2).max(0.0) / (1.0 - f64::from(taps * taps).recip()) / length2).sqrt()
 }
 
-/// Mean colour over the exposure along the polyline `nodes_px` (equal time on each segment), midpoints uniform in time.
+/// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each polynomial of the path has its
+/// samples uniformly in time, in the middles of equal parts, and at most `cap` of them.
 #[must_use]
-pub fn gather(nodes_px: &[DVec2], area: &Footprint, color: &ColorImage<'_>, samples_per_px: f64, cap: u32) -> DVec3 {
+pub fn gather(nodes_px: &[DVec2], path: PathStage, area: &Footprint, color: &ColorImage<'_>, samples_per_px: f64, cap: u32) -> DVec3 {
     let taps = area.taps[0] * area.taps[1];
     if nodes_px.len() < 2 {
         let at = nodes_px.first().copied().unwrap_or_default();
         return (0..taps).map(|i| area.tap_color(color, at, i)).sum::<DVec3>() / f64::from(taps);
     }
-    let segments = nodes_px.len() as u32 - 1;
-    let at_least = taps.div_ceil(segments);
+    let curves = path::curves(nodes_px, path);
+    let stretches = curves.len() as u32;
+    let at_least = taps.div_ceil(stretches.max(1));
     let (mut sum, mut tap) = (DVec3::ZERO, 0);
-    for ends in nodes_px.windows(2) {
-        let count = samples_for(ends[0].distance(ends[1]), samples_per_px, at_least, cap);
+    for curve in curves {
+        let count = samples_for(curve.length_px, samples_per_px, at_least, cap);
         let mut part = DVec3::ZERO;
         for i in 0..count {
-            let t = (f64::from(i) + 0.5) / f64::from(count);
-            part += area.tap_color(color, ends[0].lerp(ends[1], t), tap);
+            let t = f64::from(path.steps()) * (f64::from(i) + 0.5) / f64::from(count);
+            part += area.tap_color(color, curve.at(t), tap);
             tap += 1;
         }
         sum += part / f64::from(count);
     }
-    sum / f64::from(segments)
+    sum / f64::from(stretches.max(1))
 }
 
 #[cfg(test)]
@@ -445,7 +448,7 @@ mod tests {
             let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
             let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
             // Over all positions between the pixels, less the parabola at the centre.
-            (0..16).map(|k| gather(&[at(k)], &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
+            (0..16).map(|k| gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
         };
         for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
             let found = mean(width_px, TapStage::Grid { most: 4 });
@@ -463,7 +466,7 @@ mod tests {
         let area = Footprint::new(DVec2::new(2.3, 0.0), DVec2::new(0.0, 1.0), TapStage::Grid { most: 4 });
         assert_eq!(area.taps, [3, 1]);
         let nodes = [DVec2::new(10.0, 3.0), DVec2::new(20.0, 3.0), DVec2::new(40.0, 3.0)];
-        let mean = gather(&nodes, &area, &color, 2.0, 256);
+        let mean = gather(&nodes, PathStage::Straight, &area, &color, 2.0, 256);
         // Equal time on both segments: (15 + 30) / 2. The cyclic taps leave at most half a tap of bias over the sample count.
         assert!((mean.x - 22.5).abs() < 0.05 && (mean.y - 1.0).abs() < 1e-12, "{mean}");
     }

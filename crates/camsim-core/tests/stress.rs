@@ -6,6 +6,7 @@
 use camsim_core::{
     apply::{IdealFrame, Motion, Pipeline, Settings},
     camera::CameraModel,
+    plan::PathStage,
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
     temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, displacement::Twist, gather, reproject},
@@ -28,7 +29,7 @@ fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
         let half = DVec2::from_angle(f64::from(direction) * 0.53) * (0.5 * length_px);
         for place in 0..40 {
             let centre = DVec2::new(128.0, 128.0) + DVec2::new((f64::from(place) * 0.618).fract(), (f64::from(place) * 0.37).fract());
-            let found = gather(&[centre - half, centre + half], &POINT, color, 2.0, 1024).x;
+            let found = gather(&[centre - half, centre + half], PathStage::Straight, &POINT, color, 2.0, 1024).x;
             let exact =
                 (0..8000).map(|i| color.spline(centre + half * ((f64::from(i) + 0.5) / 4e3 - 1.0), DVec2::ZERO).x).sum::<f64>() / 8e3;
             let error = 255.0 * (found - exact).abs();
@@ -57,10 +58,10 @@ fn no_path_is_no_blur() {
     let rgba = checker([16, 16]);
     let color = ColorImage { size_px: [16, 16], rgba: &rgba };
     for at in [DVec2::new(7.0, 5.0), DVec2::new(7.3, 5.9), DVec2::new(-0.5, 15.5)] {
-        let sharp = gather(&[at], &POINT, &color, 2.0, 256);
+        let sharp = gather(&[at], PathStage::Straight, &POINT, &color, 2.0, 256);
         assert_eq!(sharp, color.spline(at, DVec2::ZERO));
-        for nodes in [2, 3, 65] {
-            assert!((gather(&vec![at; nodes], &POINT, &color, 2.0, 256) - sharp).length() < 1e-12);
+        for (nodes, path) in [(2, PathStage::Straight), (3, PathStage::Parabola), (65, PathStage::Quartic)] {
+            assert!((gather(&vec![at; nodes], path, &POINT, &color, 2.0, 256) - sharp).length() < 1e-12);
         }
     }
 }

@@ -281,6 +281,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         principal_px: plan.camera.principal_point_px.as_vec2().to_array(),
         near_m: NEAR_M as f32,
         nodes: plan.blur.map_or(1, |blur| blur.nodes),
+        node_stride: plan.blur.map_or(1, |blur| blur.stride),
         line_axis: u32::from(axis == LinesAxis::Columns),
         lines,
         fields,

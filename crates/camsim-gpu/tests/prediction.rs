@@ -144,10 +144,10 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
     let plan_ms = 1e3 * begin.elapsed().as_secs_f64();
     let mut phases = vec![0.0];
     if let Some(blur) = plan.blur {
-        // Begin, and the middles of two stretches; exactly 0 would be mid-exposure, which is solved for itself.
-        let segments = blur.nodes as f32 - 1.0;
+        // Begin, and the middles of two steps between nodes; exactly 0 would be mid-exposure, which is solved for itself.
+        let steps = blur.solved() as f32 - 1.0;
         phases.push(-0.5);
-        phases.extend([0.25, 0.75].map(|share| ((share * segments).floor() + 0.5) / segments - 0.5 + 1e-5));
+        phases.extend([0.25, 0.75].map(|share| ((share * steps).floor() + 0.5) / steps - 0.5 + 1e-5));
     }
     let mut worst: Option<CoordErrors> = None;
     for phase in phases {

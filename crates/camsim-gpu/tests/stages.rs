@@ -120,11 +120,11 @@ fn gather_as_its_twin(max_error_px: f64) -> NodeDepths {
             }
             worst_px = worst_px.max(at_px.distance(DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]))));
             worst_depth = worst_depth.max((f64::from(depths[i]) * inverse_depth - 1.0).abs());
-            let poses: Vec<_> = (0..blur.nodes).map(entry).collect();
+            let poses: Vec<_> = (0..blur.nodes).step_by(blur.stride as usize).map(entry).collect();
             let nodes = reproject_nodes(uv, &poses, entry(blur.nodes), blur.depths, iterations, &depth, &ideal.geometry);
             let Some(nodes) = nodes.into_iter().map(|node| node.map(|s| s.at_px)).collect::<Option<Vec<_>>>() else { continue };
             let area = footprint(&map, size_px, [x, y], &ideal.geometry, plan.taps);
-            let expected = gather(&nodes, &area, &color, blur.samples_per_px, blur.max_samples);
+            let expected = gather(&nodes, blur.path, &area, &color, blur.samples_per_px, blur.max_samples);
             let found = DVec3::new(
                 f64::from(done.frame.color_rgba[4 * i]),
                 f64::from(done.frame.color_rgba[4 * i + 1]),

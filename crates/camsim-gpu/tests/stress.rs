@@ -129,7 +129,7 @@ fn vibration_of_200_hz_within_the_exposure() {
     let sequence = sequence(scenario, steady(150.0, 0.0, DVec3::new(0.0, 30.0, 0.0), DVec3::ZERO), pattern(6000.0));
     let done = check("200 Hz vibration, 5 ms exposure", &sequence, GROUND, 0.05);
     // One whole period: its ends alone see nothing.
-    assert!(done.plan.blur.is_some_and(|blur| blur.nodes >= 9), "{:?}", done.plan.blur);
+    assert!(done.plan.blur.is_some_and(|blur| blur.solved() >= 5), "{:?}", done.plan.blur);
 }
 
 /// An upright wall to the north, seen by a camera that looks and flies north.

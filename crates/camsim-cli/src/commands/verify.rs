@@ -210,11 +210,11 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     })
 }
 
-/// Besides mid-exposure, which is solved for itself: the begin, and the middles of two straight stretches of the path.
+/// Besides mid-exposure, which is solved for itself: the begin, and the middles between two pairs of nodes, where the path is off most.
 fn phases(plan: &FramePlan) -> Vec<f32> {
     let Some(blur) = plan.blur else { return Vec::new() };
-    let segments = f64::from(blur.nodes - 1);
-    let middle_of = |share: f64| (((share * segments).floor() + 0.5) / segments - 0.5) as f32;
+    let steps = f64::from(blur.solved() - 1);
+    let middle_of = |share: f64| (((share * steps).floor() + 0.5) / steps - 0.5) as f32;
     // Exactly 0 would be mid-exposure.
     [-0.5, middle_of(0.25), middle_of(0.75)].map(|phase| if phase == 0.0 { 1e-4 } else { phase }).to_vec()
 }

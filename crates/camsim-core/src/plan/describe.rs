@@ -4,7 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, FramePlan, Holes, Motion, NodeDepths, Predicted, RayStage, Skip, SurfaceReads, TemporalStage};
+use super::{
+    BlurStage, EdgeStage, FramePlan, Holes, Motion, NodeDepths, PathStage, Predicted, RayStage, Skip, SurfaceReads, TemporalStage,
+};
 use crate::{
     scenario::Preset,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
@@ -120,7 +122,12 @@ impl FramePlan {
                     (TemporalStage::Reproject { .. }, NodeDepths::Ends) => " with depth of both ends",
                     _ => "",
                 };
-                format!("blur with {} nodes{depth}, {:.2} samples a px", blur.nodes, blur.samples_per_px)
+                let curve = match blur.path {
+                    PathStage::Straight => "straight lines",
+                    PathStage::Parabola => "parabolas",
+                    PathStage::Quartic => "quartics",
+                };
+                format!("blur along {curve} through {} nodes{depth}, {:.2} samples a px", blur.solved(), blur.samples_per_px)
             }
         };
         let taps = match self.taps {
@@ -186,7 +193,7 @@ impl Predicted {
             (self.lens_px, "lens inverse", ""),
             (self.temporal_px, "temporal inverse", ""),
             (self.depth_px, "depth between pixels", detail.as_str()),
-            (self.nodes_px, "straight path between exposure nodes", ""),
+            (self.nodes_px, "path between exposure nodes", ""),
             (self.format_px, "single precision", ""),
         ];
         causes.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -185,13 +185,6 @@ impl Trial<'_> {
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + truth.inverse_depth * shift)
     }
 
-    /// How far the middle of stretch `k` of the path over the exposure is from the middle of its chord.
-    pub fn chord_px(&self, probe: &Probe, truth: &Truth, k: u32, segments: u32) -> f64 {
-        let [begin, middle, end] = [0.0, 0.5, 1.0].map(|half| self.source_px(probe, truth, (f64::from(k) + half) / f64::from(segments)));
-        let miss_px = middle.distance(0.5 * (begin + end));
-        if miss_px.is_finite() { miss_px } else { 0.0 }
-    }
-
     /// Directions from the key camera, towards an ideal pixel, z = 1 in the camera, NED.
     fn key_ray(&self, at_px: DVec2) -> DVec3 {
         self.key_pose.ned_from_camera * ((at_px - self.ideal.principal_px) / self.ideal.focal_px).extend(1.0)

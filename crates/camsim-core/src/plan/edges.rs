@@ -180,7 +180,7 @@ pub(super) fn edge_stage(
 fn samples(scale: u32, blur: Option<BlurStage>) -> u32 {
     match blur {
         None => (16 * scale).next_power_of_two(),
-        Some(blur) => (blur.max_samples * (blur.nodes - 1)).clamp(32 * scale, 256).next_power_of_two(),
+        Some(blur) => (blur.max_samples * blur.stretches()).clamp(32 * scale, 256).next_power_of_two(),
     }
 }
 

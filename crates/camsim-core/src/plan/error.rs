@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::{
     BlurStage, EdgeStage, Holes, KeyFrame, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
+    exposure::miss_px,
     levels::Expected,
     probes::{Probe, spacing_px},
     rounding::Rounding,
@@ -43,9 +44,9 @@ const CHEAP_RK2_STEPS: f64 = 2.0;
 /// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
 const SHARE_STEP: usize = 5;
 /// Probes whose exposure is looked at.
-const CHORD_PROBES: usize = 32;
-/// Stretches of path looked at for each of them.
-const CHORD_SEGMENTS: u32 = 8;
+const MISS_PROBES: usize = 32;
+/// Polynomials of the path looked at for each of them.
+const MISSED_STRETCHES: u32 = 8;
 
 /// Predicted errors of a frame. All `_px` are pixels of the ideal frame and bound the 99th percentile over the valid pixels that are
 /// farther than 3 px from any silhouette.
@@ -59,7 +60,7 @@ pub struct Predicted {
     pub depth_px: f64,
     /// The part of it that is the level of detail's.
     pub level_of_detail_px: f64,
-    /// Straight stretches of the path over the exposure; nothing at mid-exposure, which is solved for itself.
+    /// Curves between the nodes of the exposure; nothing at mid-exposure, which is solved for itself.
     pub nodes_px: f64,
     /// Single precision of poses, depth and coordinates.
     pub format_px: f64,
@@ -102,7 +103,7 @@ pub(super) struct Case<'a> {
     pub key_twist: Twist,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
-    /// The same for a path that is a straight line whatever its nodes.
+    /// The same for a path that is a straight line in time.
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
@@ -173,7 +174,7 @@ impl Case<'_> {
         };
         match self.blur {
             // Two nodes are the ends.
-            Some(BlurStage { nodes: 3.., .. }) => ways.extend(NodeDepths::ALL.into_iter().flat_map(look_ups)),
+            Some(blur) if blur.solved() > 2 => ways.extend(NodeDepths::ALL.into_iter().flat_map(look_ups)),
             Some(_) => ways.extend([NodeDepths::Mid, NodeDepths::Each].into_iter().flat_map(look_ups)),
             None => ways.extend(look_ups(NodeDepths::Each)),
         }
@@ -282,7 +283,7 @@ impl Forecast<'_> {
         self.truths.largest(|i, looked| of(looked, &self.outcomes[i]))
     }
 
-    /// Without the chords of the exposure.
+    /// Without the path between the exposure's nodes.
     pub fn total_px(&self, way: Way) -> f64 {
         let of_one = |looked: &Looked, run: &Outcome| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px();
         self.largest(of_one) + SAFETY * self.between_ends_px(way)
@@ -304,9 +305,9 @@ impl Forecast<'_> {
     /// The first way within the tolerance, or the best there is.
     pub fn choose(&self, tolerance_px: f64, ways: Vec<Way>) -> Way {
         let mut best: Option<(f64, Way)> = None;
-        let mut known_nodes: Vec<(u32, f64)> = Vec::new();
+        let mut known_nodes: Vec<([u32; 2], f64)> = Vec::new();
         for way in ways {
-            let nodes = way.blur.map_or(1, |blur| blur.nodes);
+            let nodes = way.blur.map_or([0; 2], |blur| [blur.solved(), blur.path.steps()]);
             let nodes_px = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
                 let px = self.nodes_px(way.blur);
                 known_nodes.push((nodes, px));
@@ -346,7 +347,7 @@ impl Forecast<'_> {
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
             (depth_px, "depth between the pixels of the ideal frame"),
-            (nodes_px, "the straight stretches between the exposure's nodes"),
+            (nodes_px, "the path between the exposure's nodes"),
         ];
         let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
         let in_the_way = match (kept, covered) {
@@ -381,14 +382,16 @@ impl Forecast<'_> {
         Rounding::new(probe, truth.at_px, run.parallax_px, camera, trial.ideal, *ray, stage)
     }
 
-    /// Largest miss of the straight stretches between the exposure's nodes.
+    /// Largest miss of the curves between the exposure's nodes.
     fn nodes_px(&self, blur: Option<BlurStage>) -> f64 {
-        let Some(segments) = blur.map(|blur| blur.nodes - 1) else { return 0.0 };
+        let Some(blur) = blur else { return 0.0 };
         let Truths { trial, looked, .. } = self.truths;
-        let looked_at = CHORD_SEGMENTS.min(segments);
-        let every = looked.len().div_ceil(CHORD_PROBES).max(1);
+        let stretches = blur.stretches();
+        let looked_at = MISSED_STRETCHES.min(stretches);
+        let every = looked.len().div_ceil(MISS_PROBES).max(1);
         let miss = |Looked { probe, truth, .. }: &Looked| {
-            (0..looked_at).map(|k| trial.chord_px(probe, truth, k * segments / looked_at, segments)).fold(0.0, f64::max)
+            let of_stretch = |k| miss_px(blur.path, stretches, k, |share| trial.source_px(probe, truth, share));
+            (0..looked_at).map(|k| of_stretch(k * stretches / looked_at)).fold(0.0, f64::max)
         };
         SAFETY * looked.iter().step_by(every).map(miss).fold(0.0, f64::max)
     }

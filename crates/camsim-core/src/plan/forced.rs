@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{BlurStage, Motion, TemporalStage, levels::Sampling};
+use super::{TemporalStage, exposure::ExposurePath};
 use crate::{
     scenario::{Preset, QualitySpec, Solver},
     temporal::displacement::{self, RK2_STEP_DEG, Twist},
@@ -24,17 +24,8 @@ pub(super) fn temporal_stage(quality: &QualitySpec) -> Option<TemporalStage> {
 }
 
 /// Eq. 16 is a straight line in time: more than its two ends would be work for nothing.
-pub(super) fn blur_stage(
-    temporal: TemporalStage,
-    blur: Option<BlurStage>,
-    sampling: &Sampling,
-    quality: &QualitySpec,
-    motion: &Motion,
-) -> Option<BlurStage> {
-    if temporal != TemporalStage::Linear {
-        return blur;
-    }
-    blur.map(|_| sampling.blur_stage(2, quality, motion.blur_px))
+pub(super) fn exposure_path(demanded: Option<TemporalStage>, exposure: ExposurePath) -> ExposurePath {
+    if demanded == Some(TemporalStage::Linear) { ExposurePath::STRAIGHT } else { exposure }
 }
 
 impl TemporalStage {

@@ -11,7 +11,8 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, LensReach, NodeDepths, SurfaceReads,
+    BlurStage, LensReach, SurfaceReads,
+    exposure::ExposurePath,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
     surfaces::{Met, Surfaces},
@@ -40,13 +41,13 @@ const FORMAT_DN: f64 = 0.12;
 const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, 2.0];
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
-/// Most samples between two nodes.
+/// Most samples on one polynomial of the path.
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
 /// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], and a read of the spline. Rough, from frame times on
 /// llvmpipe; of an ideal pixel what is done for it beside the reads counts too (depth, silhouettes), so that reads are spent before pixels.
-const IDEAL_COSTS: [f64; 3] = [16.5, 17.5, 20.0];
+const IDEAL_COSTS: [f64; 3] = [13.0, 14.0, 16.0];
 const SPLINE_COST: f64 = 6.0;
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
 const FOG_AT_VISIBILITY: f64 = 3.912;
@@ -181,11 +182,7 @@ impl<'a> Prospect<'a> {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
             let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip(), surface_reads);
-            let samples = blur.map(|BlurStage { nodes, samples_per_px, max_samples, .. }| {
-                let segments = nodes - 1;
-                let at_least = (area.taps[0] * area.taps[1]).div_ceil(segments);
-                segments * samples_for(scale * sight.path_px / f64::from(segments), samples_per_px, at_least, max_samples)
-            });
+            let samples = blur.map(|blur| sample_count(&blur, scale * sight.path_px, &area));
             let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
             let path = samples.map(|samples| Path { along: scale * sight.path, samples });
             let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
@@ -199,18 +196,18 @@ impl<'a> Prospect<'a> {
     }
 
     /// The cheapest sampling within the tolerance, or the best there is. The scale is not below `least_scale`, and that at which the
-    /// frame does not fit is left out.
-    pub fn choose(&self, quality: &QualitySpec, least_scale: f64, nodes: u32, fits: impl Fn(f64) -> bool) -> Sampling {
+    /// frame does not fit is left out. `ideal_share`: pixels that the ideal frame has at scale 1 for each of the camera's.
+    pub fn choose(
+        &self,
+        quality: &QualitySpec,
+        least_scale: f64,
+        ideal_share: f64,
+        exposure: Option<ExposurePath>,
+        fits: impl Fn(f64) -> bool,
+    ) -> Sampling {
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && fits(scale));
         let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
-        let mut ways: Vec<(f64, Sampling)> = scales
-            .iter()
-            .flat_map(|&scale| self.stages(quality, scale).into_iter().map(move |taps| (scale, taps)))
-            .flat_map(|(scale, taps)| SurfaceReads::ALL.map(|reads| Sampling::new(scale, reads, taps)))
-            .map(|sampling| (self.cost(&sampling, nodes), sampling))
-            .collect();
-        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let tolerance_dn = quality.max_error_dn;
         let per_px = |scale: f64| match quality.blur_samples.value() {
             Some(samples) => vec![f64::from(samples)],
@@ -218,9 +215,20 @@ impl<'a> Prospect<'a> {
         };
         let way = |sampling: Sampling, samples_per_px: f64| {
             let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
-            let blur = (nodes > 1).then_some(BlurStage { nodes, depths: NodeDepths::Each, samples_per_px, max_samples });
+            let blur = exposure.map(|exposure| exposure.with_samples(samples_per_px, max_samples));
             (Sampling { samples_per_px, ..sampling }, blur)
         };
+        let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
+        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share);
+        // Each with the fewest samples first: it may not be cheaper than that.
+        let fewest = |sampling: &Sampling| way(*sampling, choices(sampling.scale).first().copied().unwrap_or(0.0));
+        let mut ways: Vec<(f64, Sampling)> = scales
+            .iter()
+            .flat_map(|&scale| self.stages(quality, scale).into_iter().map(move |taps| (scale, taps)))
+            .flat_map(|(scale, taps)| SurfaceReads::ALL.map(|reads| Sampling::new(scale, reads, taps)))
+            .map(|sampling| (cost(&fewest(&sampling)), sampling))
+            .collect();
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         // A few places tell what is far from keeping the tolerance.
         let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, &sampling, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
@@ -228,9 +236,14 @@ impl<'a> Prospect<'a> {
             Sampling { expected, ..sampling }
         };
         let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;
-        for (_, sampling) in ways {
+        let mut cheapest: Option<(f64, Sampling)> = None;
+        for (least_cost, sampling) in ways {
+            let below = cheapest.map_or(f64::INFINITY, |(cost, _)| cost);
+            if least_cost >= below {
+                break;
+            }
             // The most samples first: if those do not do, fewer need not be tried.
-            let choices = if nodes > 1 { per_px(sampling.scale) } else { vec![0.0] };
+            let choices = choices(sampling.scale);
             let Some((&last, fewer)) = choices.split_last() else { continue };
             let most = way(sampling, last);
             let rough_dn = roughly_dn(most);
@@ -239,15 +252,19 @@ impl<'a> Prospect<'a> {
             match tried.filter(|_| total_dn <= tolerance_dn) {
                 None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
                 None => {}
-                Some(most) => {
-                    let fewer = fewer.iter().map(|&samples| way(sampling, samples));
-                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(exactly);
-                    return { near }.find(|way| way.expected.total_dn() <= tolerance_dn).unwrap_or(most);
+                Some(tried) => {
+                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| cost(way) < below);
+                    let mut near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(|way| (cost(&way), exactly(way)));
+                    let enough = near.find(|(_, sampling)| sampling.expected.total_dn() <= tolerance_dn);
+                    let found = enough.unwrap_or((cost(&most), tried));
+                    if found.0 < below {
+                        cheapest = Some(found);
+                    }
                 }
             }
         }
         let none = Sampling { samples_per_px: 2.0, ..Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline) };
-        best.map_or(none, |(_, way)| exactly(way))
+        cheapest.map_or_else(|| best.map_or(none, |(_, way)| exactly(way)), |(_, sampling)| sampling)
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -262,21 +279,24 @@ impl<'a> Prospect<'a> {
     }
 
     /// Time of a way, in bilinear reads of an output pixel.
-    fn cost(&self, sampling: &Sampling, nodes: u32) -> f64 {
+    fn cost(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> f64 {
         let &Sampling { scale, surface_reads, taps, .. } = sampling;
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let reads = if nodes > 1 {
-                (2.0 * sight.path_px).max(f64::from(area.taps[0] * area.taps[1]))
-            } else {
-                f64::from(area.taps[0] * area.taps[1])
-            };
-            reads * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
+            let reads = blur.map_or(area.taps[0] * area.taps[1], |blur| sample_count(&blur, scale * sight.path_px, &area));
+            f64::from(reads) * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
         };
         let reads = self.sights.iter().map(of).sum::<f64>() / self.sights.len().max(1) as f64;
-        scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
+        ideal_share * scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
     }
+}
+
+/// Samples of a pixel whose path is so long, if it is equally long in each of its stretches.
+fn sample_count(blur: &BlurStage, length_px: f64, area: &Footprint) -> u32 {
+    let stretches = blur.stretches();
+    let at_least = (area.taps[0] * area.taps[1]).div_ceil(stretches);
+    stretches * samples_for(length_px / f64::from(stretches), blur.samples_per_px, at_least, blur.max_samples)
 }
 
 fn dn(square: f64) -> f64 {
@@ -365,12 +385,13 @@ impl Sampling {
         Self::new(1.0, SurfaceReads::Grid, TapStage::Bilinear)
     }
 
-    /// The exposure's samples between so many nodes, for paths of up to `blur_px` ideal pixels.
-    pub fn blur_stage(&self, nodes: u32, quality: &QualitySpec, blur_px: f64) -> BlurStage {
+    /// The exposure's samples for paths of up to `blur_px` ideal pixels.
+    pub fn blur_stage(&self, exposure: ExposurePath, quality: &QualitySpec, blur_px: f64) -> BlurStage {
+        let stretches = exposure.stretches;
         let (samples_per_px, max_samples) = match quality.blur_samples.value() {
-            Some(samples) => (f64::from(samples), samples.div_ceil(nodes - 1)),
-            None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / (nodes - 1) + 2).clamp(2, MAX_SAMPLES)),
+            Some(samples) => (f64::from(samples), samples.div_ceil(stretches)),
+            None => (self.samples_per_px, ((self.samples_per_px.max(1.0) * blur_px).ceil() as u32 / stretches + 2).clamp(2, MAX_SAMPLES)),
         };
-        BlurStage { nodes, depths: NodeDepths::Each, samples_per_px, max_samples }
+        exposure.with_samples(samples_per_px, max_samples)
     }
 }

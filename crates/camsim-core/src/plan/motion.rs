@@ -3,27 +3,15 @@
 use glam::DVec2;
 
 use super::{LensReach, Motion, Skip, TemporalStage, surfaces::Surfaces};
-use crate::{
-    mount::CameraPath,
-    scenario::{Auto, QualitySpec},
-    shutter::Shutter,
-    temporal::IdealGeometry,
-};
+use crate::{mount::CameraPath, shutter::Shutter, temporal::IdealGeometry};
 
-/// Part of the tolerance that a left-out effect may use up.
-const NEGLIGIBLE: f64 = 0.2;
-/// A path shorter than this is no blur, ideal pixels: it takes 0.4 % from the finest wave that the frame holds (1 - sinc(pi / 20)). How much
-/// the picture may be off is not for `quality.max_error_px` to say.
-const SHARP_PX: f64 = 0.1;
-/// Most exposure nodes.
-const MAX_NODES: u32 = 65;
-/// Exposure nodes for each period of the fastest vibration.
-const NODES_PER_PERIOD: f64 = 8.0;
+/// Instants for each period of the fastest vibration.
+const INSTANTS_PER_PERIOD: f64 = 8.0;
 
 /// Instants that cover a window: 17, and at least 8 a vibration period.
 pub(super) fn instants(path: &CameraPath, window_s: [f64; 2]) -> impl Iterator<Item = f64> {
     let [first, last] = window_s;
-    let steps = (NODES_PER_PERIOD * path.highest_vibration_hz() * (last - first)).ceil().clamp(16.0, 4096.0) as u32;
+    let steps = (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * (last - first)).ceil().clamp(16.0, 4096.0) as u32;
     (0..=steps).map(move |k| first + (last - first) * f64::from(k) / f64::from(steps))
 }
 
@@ -72,7 +60,7 @@ fn blur_path(
     if exposure_s <= 0.0 {
         return (0.0, 0.0);
     }
-    let steps = (NODES_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
+    let steps = (INSTANTS_PER_PERIOD * path.highest_vibration_hz() * exposure_s).ceil().clamp(16.0, 256.0) as u32;
     let (mut longest, mut sagitta) = (0.0_f64, 0.0_f64);
     let every = (reach.rays.len() / 24).max(1);
     for &(uv, [x, y]) in reach.rays.iter().step_by(every) {
@@ -98,40 +86,6 @@ fn blur_path(
     (longest, sagitta)
 }
 
-/// Largest miss of the chords of so many equal stretches of the exposure, in their middles: of up to eight stretches of a few rays, at
-/// both depth extremes.
-fn chords_px(
-    reach: &LensReach,
-    path: &CameraPath,
-    shutter: &Shutter,
-    stamp_s: f64,
-    ideal: &IdealGeometry,
-    near_m: f64,
-    segments: u32,
-) -> f64 {
-    const LOOKED_AT: u32 = 8;
-    let looked_at = LOOKED_AT.min(segments);
-    let mut worst = 0.0_f64;
-    for &(uv, [x, y]) in reach.rays.iter().step_by((reach.rays.len() / 24).max(1)) {
-        let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
-        let mid = path.pose(mid_s);
-        for w in [0.0, 1.0 / near_m] {
-            let place = |along: f64| {
-                let t_s = mid_s + shutter.exposure_s() * (along / f64::from(segments) - 0.5);
-                let (rotation, shift) = path.pose(t_s).relative_to(&mid);
-                let p = rotation * uv.extend(1.0) + w * shift;
-                (p.z > 0.02).then(|| ideal.focal_px * p.truncate() / p.z)
-            };
-            for k in (0..looked_at).map(|k| f64::from(k * segments / looked_at)) {
-                if let (Some(begin), Some(middle), Some(end)) = (place(k), place(k + 0.5), place(k + 1.0)) {
-                    worst = worst.max(middle.distance(0.5 * (begin + end)));
-                }
-            }
-        }
-    }
-    worst
-}
-
 /// What the choice of a temporal inverse leaves out, and why nothing is lost.
 pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut Vec<Skip>) {
     if matches!(temporal, TemporalStage::Rotation | TemporalStage::Identity) {
@@ -146,40 +100,4 @@ pub(super) fn note_skips(motion: &Motion, temporal: TemporalStage, skipped: &mut
             reason: format!("rotation within the frame moves no pixel by more than {:.2e} px", motion.rotation_px),
         });
     }
-}
-
-/// Nodes of the exposure, or `None` when it does not show.
-pub(super) fn exposure_nodes(
-    motion: &Motion,
-    quality: &QualitySpec,
-    reach: &LensReach,
-    path: &CameraPath,
-    shutter: &Shutter,
-    stamp_s: f64,
-    ideal: &IdealGeometry,
-    skipped: &mut Vec<Skip>,
-) -> Option<u32> {
-    if shutter.exposure_s() <= 0.0 {
-        skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
-        return None;
-    }
-    if motion.blur_px <= quality.max_error_px.min(SHARP_PX) && quality.blur_samples == Auto::Auto {
-        skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {:.2e} px", motion.blur_px) });
-        return None;
-    }
-    // The chord's miss falls with the square of the number of stretches, once these are shorter than the bends; half the tolerance is its.
-    let allowed_px = 0.5 * quality.max_error_px;
-    let by_curve = (motion.blur_sagitta_px / allowed_px).sqrt().ceil();
-    let by_vibration = (NODES_PER_PERIOD * path.highest_vibration_hz() * shutter.exposure_s()).ceil();
-    let most = f64::from(MAX_NODES - 1);
-    let mut segments =
-        by_curve.max(if motion.blur_sagitta_px > NEGLIGIBLE * quality.max_error_px { by_vibration } else { 1.0 }).clamp(1.0, most);
-    for _ in 0..3 {
-        let miss_px = chords_px(reach, path, shutter, stamp_s, ideal, motion.nearest_m, segments as u32);
-        if miss_px <= allowed_px {
-            break;
-        }
-        segments = (segments * (1.05 * miss_px / allowed_px).sqrt()).ceil().min(most);
-    }
-    Some(segments as u32 + 1)
 }

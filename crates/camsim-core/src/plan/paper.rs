@@ -14,7 +14,7 @@
 
 use glam::DVec2;
 
-use super::{BlurStage, NodeDepths, RayStage, Skip};
+use super::{BlurStage, NodeDepths, PathStage, RayStage, Skip};
 use crate::{
     camera::CameraModel,
     scenario::QualitySpec,
@@ -53,7 +53,14 @@ pub(super) fn blur_stage(shutter: &Shutter, quality: &QualitySpec, skipped: &mut
         return None;
     }
     let samples = quality.blur_samples.value().unwrap_or(BLUR_SAMPLES);
-    Some(BlurStage { nodes: 2, depths: NodeDepths::Each, samples_per_px: f64::from(samples), max_samples: samples })
+    Some(BlurStage {
+        nodes: 2,
+        stride: 1,
+        path: PathStage::Straight,
+        depths: NodeDepths::Each,
+        samples_per_px: f64::from(samples),
+        max_samples: samples,
+    })
 }
 
 pub(super) fn fog(scene: &Scene) -> Option<LinearFog> {

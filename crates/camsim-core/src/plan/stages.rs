@@ -68,15 +68,61 @@ impl NodeDepths {
     pub const ALL: [Self; 3] = [Self::Mid, Self::Ends, Self::Each];
 }
 
+/// The curve that joins the nodes of an exposure: one polynomial of time through each so many of them, the last of which is the next one's
+/// first. With h from node to node it misses a path p by at most `h^2 |p''| / 8`, `h^3 |p'''| / 15.6` or `h^5 |p'''''| / 33`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PathStage {
+    /// Two nodes.
+    Straight,
+    /// Three.
+    Parabola,
+    /// Five.
+    Quartic,
+}
+
+impl PathStage {
+    /// All of them, in the order of their degree.
+    pub const ALL: [Self; 3] = [Self::Straight, Self::Parabola, Self::Quartic];
+
+    /// Steps from node to node along one polynomial: its degree.
+    #[must_use]
+    pub fn steps(self) -> u32 {
+        match self {
+            Self::Straight => 1,
+            Self::Parabola => 2,
+            Self::Quartic => 4,
+        }
+    }
+}
+
 /// Motion blur.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlurStage {
-    /// Exactly known poses over the exposure.
+    /// Exactly known poses over the exposure, equally far apart in time. Rays of their own at silhouettes take poses linear between them.
     pub nodes: u32,
+    /// The path of a source goes through every so many of them.
+    pub stride: u32,
+    /// What joins those.
+    pub path: PathStage,
     /// What depth they take.
     pub depths: NodeDepths,
     /// Samples a pixel of path (up to 16 px; one a pixel beyond).
     pub samples_per_px: f64,
-    /// Cap of the samples between two nodes.
+    /// Cap of the samples on one polynomial.
     pub max_samples: u32,
+}
+
+impl BlurStage {
+    /// Nodes that the path goes through.
+    #[must_use]
+    pub fn solved(&self) -> u32 {
+        (self.nodes - 1) / self.stride + 1
+    }
+
+    /// Polynomials of the path.
+    #[must_use]
+    pub fn stretches(&self) -> u32 {
+        (self.nodes - 1) / (self.stride * self.path.steps())
+    }
 }

@@ -1,7 +1,7 @@
 //! What a kernel is composed of.
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NodeDepths, RayStage, TemporalStage},
+    plan::{EdgeStage, FramePlan, NodeDepths, PathStage, RayStage, TemporalStage},
     scenario::Preset,
     temporal::TapStage,
 };
@@ -70,6 +70,8 @@ pub struct PipelineKey {
     pub blur: bool,
     /// Where depth is looked up for the nodes of the exposure, if there are any and it is.
     pub depths: NodeDepths,
+    /// What joins them.
+    pub path: PathStage,
     /// What reads the ideal frame.
     pub tap: TapKind,
     /// More than one ideal frame.
@@ -98,6 +100,7 @@ impl PipelineKey {
             temporal,
             blur: plan.blur.is_some(),
             depths: plan.blur.map_or(NodeDepths::Each, |blur| blur.depths),
+            path: plan.blur.map_or(PathStage::Straight, |blur| blur.path),
             tap: plan.taps.into(),
             keys: plan.keys.len() > 1,
             edges: plan.edges.into(),
@@ -128,13 +131,18 @@ impl PipelineKey {
                             continue;
                         }
                         let looks_up = blur && temporal == Reproject;
-                        for depths in NodeDepths::ALL.into_iter().filter(|&depths| looks_up || depths == NodeDepths::Each) {
+                        let exposures = NodeDepths::ALL
+                            .into_iter()
+                            .flat_map(|depths| PathStage::ALL.map(|path| (depths, path)))
+                            .filter(|&(depths, path)| looks_up || depths == NodeDepths::Each && (blur || path == PathStage::Straight));
+                        for (depths, path) in exposures {
                             for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
                                 keys.extend([false, true].map(|truth| Self {
                                     ray,
                                     temporal,
                                     blur,
                                     depths,
+                                    path,
                                     tap,
                                     keys: several,
                                     edges,
@@ -154,6 +162,7 @@ impl PipelineKey {
                     temporal: Rk2,
                     blur,
                     depths: NodeDepths::Each,
+                    path: PathStage::Straight,
                     tap: TapKind::Bilinear,
                     keys: false,
                     edges: EdgeKind::None,
@@ -167,7 +176,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 11] {
+    pub fn slots(&self) -> [Slot; 12] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -206,6 +215,11 @@ impl PipelineKey {
             (TemporalKind::Reproject, NodeDepths::Each) => "reverse/gather/nodes/each.wgsl",
             _ => "reverse/gather/nodes/solved.wgsl",
         };
+        let path = match self.path {
+            PathStage::Straight => "reverse/gather/path/straight.wgsl",
+            PathStage::Parabola => "reverse/gather/path/parabola.wgsl",
+            PathStage::Quartic => "reverse/gather/path/quartic.wgsl",
+        };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
             ("keys", keys),
@@ -214,6 +228,7 @@ impl PipelineKey {
             ("temporal_inverse", temporal),
             ("gather", gather),
             ("nodes", nodes),
+            ("path", path),
             ("tap", tap),
             ("edges", edges),
             ("surface_color", surface_color),
@@ -256,6 +271,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 548);
+        assert_eq!(PipelineKey::all().len(), 1196);
     }
 }

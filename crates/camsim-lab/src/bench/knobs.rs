@@ -124,7 +124,7 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
 fn blur_rule(sequence: &Arc<Sequence>) -> Option<u32> {
     let planner = Planner::new(sequence.clone(), &[Channel::Color], MAX_SIDE_PX).ok()?;
     let blur = planner.plan(0).ok()?.blur?;
-    Some(blur.max_samples * (blur.nodes - 1).max(1))
+    Some(blur.max_samples * blur.stretches())
 }
 
 /// The same view in another size: the focal length follows the height.

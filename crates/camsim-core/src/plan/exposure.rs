@@ -1,0 +1,182 @@
+//! Where over the exposure a source's path is known exactly, and what joins those places.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::{BlurStage, LensReach, Motion, NodeDepths, PathStage, Skip};
+use crate::{
+    mount::CameraPath,
+    scenario::{Auto, QualitySpec},
+    shutter::Shutter,
+    temporal::path::Curve,
+};
+
+/// A path shorter than this is no blur, ideal pixels: it takes 0.4 % from the finest wave that the frame holds (1 - sinc(pi / 20)). How much
+/// the picture may be off is not for `quality.max_error_px` to say.
+const SHARP_PX: f64 = 0.1;
+/// Part of the tolerance that the path between nodes may miss.
+const SHARE: f64 = 0.5;
+/// Most steps from node to node.
+const MOST_STEPS: u32 = 64;
+/// Nodes for each period of the fastest vibration: straight lines take that many to be near it, and fewer than the other would not tell it from stillness.
+const STRAIGHT_PER_PERIOD: f64 = 8.0;
+const LEAST_PER_PERIOD: f64 = 4.0;
+/// Polynomials of a path that are compared with it.
+const LOOKED_AT: u32 = 8;
+/// Rays whose paths are looked at.
+const RAYS: usize = 24;
+
+/// The path over an exposure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ExposurePath {
+    pub path: PathStage,
+    /// Polynomials.
+    pub stretches: u32,
+    /// Steps of the pose table for each step of the path.
+    pub stride: u32,
+}
+
+impl ExposurePath {
+    /// From end to end.
+    pub const STRAIGHT: Self = Self { path: PathStage::Straight, stretches: 1, stride: 1 };
+
+    pub fn with_samples(self, samples_per_px: f64, max_samples: u32) -> BlurStage {
+        let Self { path, stretches, stride } = self;
+        let nodes = stretches * path.steps() * stride + 1;
+        BlurStage { nodes, stride, path, depths: NodeDepths::Each, samples_per_px, max_samples }
+    }
+}
+
+/// An exposure whose path is to be chosen.
+pub(super) struct Exposed<'a> {
+    pub reach: &'a LensReach,
+    pub path: &'a CameraPath,
+    pub shutter: &'a Shutter,
+    pub stamp_s: f64,
+    /// Of the ideal frame.
+    pub focal_px: DVec2,
+    pub motion: Motion,
+}
+
+impl Exposed<'_> {
+    /// The path with the fewest nodes that is missed by no more than its share of the tolerance; `None` where the exposure does not show.
+    pub fn path(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<ExposurePath> {
+        if self.shutter.exposure_s() <= 0.0 {
+            skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
+            return None;
+        }
+        let blur_px = self.motion.blur_px;
+        if blur_px <= quality.max_error_px.min(SHARP_PX) && quality.blur_samples == Auto::Auto {
+            skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {blur_px:.2e} px") });
+            return None;
+        }
+        let allowed_px = SHARE * quality.max_error_px;
+        if self.motion.blur_sagitta_px <= allowed_px {
+            return Some(ExposurePath::STRAIGHT);
+        }
+        let of_parabola = |stretches| self.miss_px(PathStage::Parabola, stretches);
+        if LEAST_PER_PERIOD * self.periods() <= 2.0 && of_parabola(1) <= allowed_px {
+            return Some(ExposurePath { path: PathStage::Parabola, stretches: 1, stride: 1 });
+        }
+        let path = PathStage::Quartic;
+        Some(ExposurePath { path, stretches: self.stretches(path, LEAST_PER_PERIOD, allowed_px), stride: 1 })
+    }
+
+    /// With poses so near to each other that straight lines between them miss no more than the path does: rays at silhouettes take those.
+    pub fn with_poses_for_rays(&self, exposure: ExposurePath, quality: &QualitySpec) -> ExposurePath {
+        let wanted = self.stretches(PathStage::Straight, STRAIGHT_PER_PERIOD, SHARE * quality.max_error_px);
+        let steps = exposure.stretches * exposure.path.steps();
+        ExposurePath { stride: wanted.div_ceil(steps).min(MOST_STEPS / steps).max(1), ..exposure }
+    }
+
+    /// Periods of the fastest vibration within the exposure, where it bends the path.
+    fn periods(&self) -> f64 {
+        self.path.highest_vibration_hz() * self.shutter.exposure_s()
+    }
+
+    /// Polynomials of one kind that keep within `allowed_px`, or as many as there may be.
+    fn stretches(&self, path: PathStage, per_period: f64, allowed_px: f64) -> u32 {
+        let steps = f64::from(path.steps());
+        let most = (f64::from(MOST_STEPS) / steps).floor();
+        let mut stretches = (per_period * self.periods() / steps).ceil().clamp(1.0, most);
+        if path == PathStage::Straight {
+            stretches = (self.motion.blur_sagitta_px / allowed_px).sqrt().ceil().clamp(stretches, most);
+        }
+        // The miss falls with a power of the number, once the stretches are shorter than the bends.
+        for _ in 0..4 {
+            let miss_px = self.miss_px(path, stretches as u32);
+            if miss_px <= allowed_px || stretches >= most {
+                break;
+            }
+            stretches = (stretches * (1.05 * miss_px / allowed_px).powf((steps + 1.0).recip())).ceil().clamp(stretches + 1.0, most);
+        }
+        stretches as u32
+    }
+
+    /// Largest miss, of up to eight polynomials of a few rays, at both depth extremes.
+    fn miss_px(&self, path: PathStage, stretches: u32) -> f64 {
+        let looked_at = LOOKED_AT.min(stretches);
+        let halves = 2 * path.steps();
+        let mut worst = 0.0_f64;
+        for &(uv, [x, y]) in self.reach.rays.iter().step_by((self.reach.rays.len() / RAYS).max(1)) {
+            let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
+            let mid = self.path.pose(mid_s);
+            for k in (0..looked_at).map(|k| k * stretches / looked_at) {
+                let pose = |half: u32| {
+                    let share = (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
+                    self.path.pose(mid_s + self.shutter.exposure_s() * (share - 0.5)).relative_to(&mid)
+                };
+                let poses: Vec<(DMat3, DVec3)> = (0..=halves).map(pose).collect();
+                for w in [0.0, 1.0 / self.motion.nearest_m] {
+                    let place = |(rotation, shift): &(DMat3, DVec3)| {
+                        let p = *rotation * uv.extend(1.0) + w * *shift;
+                        (p.z > 0.02).then(|| self.focal_px * p.truncate() / p.z)
+                    };
+                    let places: Option<Vec<DVec2>> = poses.iter().map(place).collect();
+                    worst = worst.max(places.map_or(0.0, |places| miss_of(&places)));
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a share of the exposure (0 to 1).
+pub(super) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl Fn(f64) -> DVec2) -> f64 {
+    let halves = 2 * path.steps();
+    let places: Vec<DVec2> =
+        (0..=halves).map(|half| place((f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches))).collect();
+    let miss_px = miss_of(&places);
+    if miss_px.is_finite() { miss_px } else { 0.0 }
+}
+
+/// How far the polynomial through every second place is from the places between them, where it is off by at least nine tenths of the most
+/// that it is.
+fn miss_of(places: &[DVec2]) -> f64 {
+    let nodes: Vec<DVec2> = places.iter().copied().step_by(2).collect();
+    let curve = Curve::through(&nodes);
+    let between = places.iter().enumerate().skip(1).step_by(2);
+    between.map(|(half, place)| curve.at(0.5 * half as f64).distance(*place)).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_miss_is_found() {
+        for path in PathStage::ALL {
+            let swing = |share: f64| DVec2::new(10.0 * share, (2.5 * share + 0.4).sin());
+            let stretches = 2;
+            let found = (0..stretches).map(|k| miss_px(path, stretches, k, swing)).fold(0.0, f64::max);
+            let steps = path.steps();
+            let mut largest = 0.0_f64;
+            for k in 0..stretches {
+                let at = |t: f64| swing((f64::from(k) + t / f64::from(steps)) / f64::from(stretches));
+                let curve = Curve::through(&(0..=steps).map(|j| at(f64::from(j))).collect::<Vec<_>>());
+                let places = (0..=1000).map(|i| f64::from(steps * i) / 1000.0);
+                largest = places.map(|t| curve.at(t).distance(at(t))).fold(largest, f64::max);
+            }
+            assert!(found <= largest && found > 0.85 * largest, "{path:?}: {found:.3e} of {largest:.3e}");
+        }
+    }
+}

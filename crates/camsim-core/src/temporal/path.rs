@@ -1,0 +1,88 @@
+//! Path of a source over the exposure: polynomials of time through a few places that are known exactly. Twin of
+//! `shaders/reverse/gather/path/*.wgsl`.
+
+use glam::DVec2;
+
+use crate::plan::PathStage;
+
+/// Most places on one polynomial.
+const MOST: usize = 5;
+
+/// The polynomial through up to five places equally far apart in time, by Newton's forward differences.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Curve {
+    differences: [DVec2; MOST],
+    /// Of the chords from place to place, pixels.
+    pub length_px: f64,
+}
+
+impl Curve {
+    /// Through `places`; what is beyond the fifth is left out.
+    #[must_use]
+    pub fn through(places: &[DVec2]) -> Self {
+        let mut row = [DVec2::ZERO; MOST];
+        let count = places.len().min(MOST);
+        row[..count].copy_from_slice(&places[..count]);
+        let mut differences = [row[0]; MOST];
+        for (order, difference) in differences.iter_mut().enumerate().skip(1) {
+            for i in 0..count.saturating_sub(order) {
+                row[i] = row[i + 1] - row[i];
+            }
+            *difference = if order < count { row[0] } else { DVec2::ZERO };
+        }
+        Self { differences, length_px: places.windows(2).map(|pair| pair[0].distance(pair[1])).sum() }
+    }
+
+    /// Place after so many steps from the first one.
+    #[must_use]
+    pub fn at(&self, steps: f64) -> DVec2 {
+        let [p, d1, d2, d3, d4] = self.differences;
+        p + steps * (d1 + (steps - 1.0) / 2.0 * (d2 + (steps - 2.0) / 3.0 * (d3 + (steps - 3.0) / 4.0 * d4)))
+    }
+}
+
+/// The polynomials through all of `places`, one after the other: one for each so many steps as `stage` says.
+pub fn curves(places: &[DVec2], stage: PathStage) -> impl ExactSizeIterator<Item = Curve> + '_ {
+    let steps = stage.steps() as usize;
+    (0..places.len().saturating_sub(1) / steps).map(move |k| Curve::through(&places[k * steps..=(k + 1) * steps]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_goes_through_its_places_and_is_a_polynomial_of_their_number() {
+        for steps in 1..MOST {
+            // Of the same degree: met everywhere.
+            let path = |t: f64| DVec2::new(3.0 - t + 0.5 * t.powi(steps as i32), 2.0 * t);
+            let places: Vec<DVec2> = (0..=steps).map(|k| path(k as f64)).collect();
+            let curve = Curve::through(&places);
+            for t in [0.0, 0.3, 1.0, 0.5 * steps as f64, steps as f64] {
+                assert!(curve.at(t).distance(path(t)) < 1e-12, "{steps} steps, {t}");
+            }
+        }
+        assert_eq!(Curve::through(&[]).at(0.7), DVec2::ZERO);
+    }
+
+    #[test]
+    fn a_swing_is_missed_by_no_more_than_the_bound_of_each_stage() {
+        // p = sin(w t), h from node to node.
+        for (stage, bound) in PathStage::ALL.into_iter().zip([1.0 / 8.0, 1.0 / 15.58, 1.0 / 33.0]) {
+            for wh in [0.2_f64, 0.5, 1.0] {
+                let path = |t: f64| DVec2::new((wh * t + 0.4).sin(), 0.0);
+                let places: Vec<DVec2> = (0..=8).map(|k| path(f64::from(k))).collect();
+                let steps = f64::from(stage.steps());
+                let mut worst = 0.0_f64;
+                for (k, curve) in curves(&places, stage).enumerate() {
+                    for i in 0..=100 {
+                        let t = steps * f64::from(i) / 100.0;
+                        worst = worst.max(curve.at(t).distance(path(k as f64 * steps + t)));
+                    }
+                }
+                let order = 1 + stage.steps() as i32;
+                assert!(worst <= bound * wh.powi(order) && worst > 0.4 * bound * wh.powi(order), "{stage:?} {wh}: {worst:.2e}");
+            }
+        }
+    }
+}

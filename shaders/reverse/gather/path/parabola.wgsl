@@ -1,0 +1,25 @@
+// A parabola of time through three nodes, by Newton's forward differences. Twin: camsim_core::temporal::path::Curve.
+const STEPS: u32 = 2u;
+
+struct Curve {
+    begin_px: vec2<f32>,
+    d1: vec2<f32>,
+    d2: vec2<f32>,
+    length_px: f32,
+    inside: bool,
+    end: Source,
+}
+
+// From a node on, that of number `node`.
+fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
+    let middle = next_node(pixel, ray, node + frame.node_stride);
+    let end = next_node(pixel, ray, node + 2u * frame.node_stride);
+    let d1 = middle.at_px - begin.at_px;
+    let last = end.at_px - middle.at_px;
+    return Curve(begin.at_px, d1, last - d1, length(d1) + length(last), begin.inside && middle.inside && end.inside, end);
+}
+
+// Place after so many steps.
+fn along(curve: Curve, steps: f32) -> vec2<f32> {
+    return curve.begin_px + steps * (curve.d1 + 0.5 * (steps - 1.0) * curve.d2);
+}
