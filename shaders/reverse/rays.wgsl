@@ -14,7 +14,7 @@
 #import <slot:color>
 #import <slot:emit>
 
-// As in edges/listed.wgsl.
+// As in edges/list.wgsl.
 struct Listed {
     groups: vec3<u32>,
     count: u32,

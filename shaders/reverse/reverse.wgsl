@@ -27,7 +27,7 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let weight = vignette_weight(pixel);
-    var gathered = Gathered(vec4<f32>(0.0), true);
+    var gathered = Gathered(vec4<f32>(0.0), true, array<vec2<f32>, 2>());
     use_key_of_line(pixel);
     if (weight > 0.0) {
         gathered = gather(pixel, ray);

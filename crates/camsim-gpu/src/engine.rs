@@ -134,7 +134,7 @@ impl Engine {
             targets: Vec::new(),
             drawn: None,
             slots,
-            listed: None,
+            lists: None,
             buffers,
             planner,
             engine: self,
@@ -182,7 +182,7 @@ pub struct Session<'a> {
     drawn: Option<Drawn>,
     slots: Vec<Slot>,
     /// Pixels of the frame at work that may see silhouettes, for frames that have any.
-    listed: Option<wgpu::Buffer>,
+    lists: Option<[wgpu::Buffer; 2]>,
     vignette: wgpu::Buffer,
     noise_table: wgpu::Buffer,
     coords_phase: f32,
@@ -419,13 +419,15 @@ impl Session<'_> {
         recorder.write(&buffers.poses, 0, bytes);
         let Some(target) = self.drawn.as_ref().map(|drawn| &mut self.targets[drawn.target]) else { return Ok(()) };
         let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| &map.view) } else { None };
-        let listed = (plan.edges != EdgeStage::None).then(|| {
-            let listed = self.listed.get_or_insert_with(|| list_buffer(gpu, plan.camera.size_px));
-            recorder.write(listed, 0, bytemuck::cast_slice(&EMPTY_LIST));
-            &*listed
+        let lists = (plan.edges != EdgeStage::None).then(|| {
+            let lists = self
+                .lists
+                .get_or_insert_with(|| ["camsim.candidates", "camsim.listed"].map(|label| list_buffer(gpu, label, plan.camera.size_px)));
+            lists.iter().for_each(|list| recorder.write(list, 0, bytemuck::cast_slice(&EMPTY_LIST)));
+            &*lists
         });
         let bindings = ReverseBindings {
-            listed,
+            lists,
             frame: &buffers.frame,
             noise_table: &self.noise_table,
             color: &target.ideal.gathered_color,

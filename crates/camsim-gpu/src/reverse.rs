@@ -29,7 +29,9 @@ pub use key::{EdgeKind, PipelineKey, TapKind, TemporalKind};
 
 /// The kernel's main file.
 pub const SHADER: &str = "reverse/reverse.wgsl";
-/// The kernel of the pixels that it lists, where silhouettes can be in view.
+/// The kernel that goes through the pixels that it lists, where silhouettes can be in view.
+pub const CANDIDATES_SHADER: &str = "reverse/edges/candidates.wgsl";
+/// The kernel of those that stay.
 pub const RAYS_SHADER: &str = "reverse/rays.wgsl";
 /// Edge of the square workgroups.
 const WORKGROUP_PX: u32 = 8;
@@ -57,8 +59,9 @@ pub struct ReverseBindings<'a> {
     pub out_color: &'a wgpu::Buffer,
     /// Depth and coordinates, when the key writes them.
     pub out_truth: Option<&'a wgpu::Buffer>,
-    /// Listed pixels, when the key lists any: [`list_size`] bytes, the first four words of them [`EMPTY_LIST`].
-    pub listed: Option<&'a wgpu::Buffer>,
+    /// Lists of pixels, when the key lists any: of the picture's kernel, and what stays of it. Each has [`list_size`] bytes, the first four words of
+    /// them [`EMPTY_LIST`].
+    pub lists: Option<&'a [wgpu::Buffer; 2]>,
 }
 
 /// Head of the list of pixels before a frame: arguments of an empty dispatch, and no pixel.
@@ -70,10 +73,10 @@ pub fn list_size(size_px: [u32; 2]) -> u64 {
     4 * (EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]))
 }
 
-/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and that of its silhouettes, made when a key is first
+/// Bind groups of one frame in flight with one ideal target: of the picture's kernel and those of its silhouettes, made when a key is first
 /// used. They go with the target, and when a buffer of the frame's is replaced.
 #[derive(Debug, Default)]
-pub struct ReverseGroups(HashMap<PipelineKey, [Groups; 2]>);
+pub struct ReverseGroups(HashMap<PipelineKey, [Groups; 3]>);
 
 type Groups = [Option<wgpu::BindGroup>; 4];
 
@@ -87,14 +90,26 @@ impl ReverseGroups {
 #[derive(Debug)]
 struct Variant {
     pipeline: wgpu::ComputePipeline,
+    lists: Lists,
     groups: [Option<wgpu::BindGroupLayout>; 4],
 }
 
-/// The kernels of a frame: the picture's, and its silhouettes'.
+/// The kernels of a frame: the picture's, and where there may be silhouettes that of its list and that of their rays.
 #[derive(Debug)]
 struct Kernels {
     picture: Variant,
-    silhouettes: Option<Variant>,
+    silhouettes: Option<[Variant; 2]>,
+}
+
+/// What a kernel does with the lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lists {
+    /// Fills the first.
+    Fills,
+    /// Takes what stays from the first into the second.
+    Thins,
+    /// Reads the second.
+    Reads,
 }
 
 /// Kernels, compiled when first needed.
@@ -133,32 +148,40 @@ impl ReversePass {
         let kernels = match self.variants.entry(key) {
             Entry::Occupied(compiled) => compiled.into_mut(),
             Entry::Vacant(first_use) => first_use.insert(Kernels {
-                picture: Variant::new(gpu, key, SHADER, "reverse", false)?,
-                silhouettes: (key.edges != EdgeKind::None).then(|| Variant::new(gpu, key, RAYS_SHADER, "rays", true)).transpose()?,
+                picture: Variant::new(gpu, key, SHADER, "reverse", Lists::Fills)?,
+                silhouettes: match key.edges {
+                    EdgeKind::None => None,
+                    _ => Some([
+                        Variant::new(gpu, key, CANDIDATES_SHADER, "ask", Lists::Thins)?,
+                        Variant::new(gpu, key, RAYS_SHADER, "rays", Lists::Reads)?,
+                    ]),
+                },
             }),
         };
-        let [of_picture, of_silhouettes] = groups.0.entry(key).or_insert_with(|| {
+        let [of_picture, of_silhouettes @ ..] = groups.0.entry(key).or_insert_with(|| {
             let bind = |variant: &Variant| variant.bind(gpu, &self.sampler, bindings);
-            [bind(&kernels.picture), kernels.silhouettes.as_ref().map(bind).unwrap_or_default()]
+            let [candidates, rays] = kernels.silhouettes.as_ref().map(|of| of.each_ref().map(bind)).unwrap_or_default();
+            [bind(&kernels.picture), candidates, rays]
         });
         let mut pass = recorder.compute_pass("reverse");
         kernels.picture.set(&mut pass, of_picture);
         pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
         drop(pass);
-        if let (Some(variant), Some(listed)) = (&kernels.silhouettes, bindings.listed) {
-            let mut pass = recorder.compute_pass("rays");
-            variant.set(&mut pass, of_silhouettes);
-            pass.dispatch_workgroups_indirect(listed, 0);
+        if let (Some(variants), Some(lists)) = (&kernels.silhouettes, bindings.lists) {
+            for (((variant, groups), list), name) in variants.iter().zip(of_silhouettes).zip(lists).zip(["candidates", "rays"]) {
+                let mut pass = recorder.compute_pass(name);
+                variant.set(&mut pass, groups);
+                pass.dispatch_workgroups_indirect(list, 0);
+            }
         }
         Ok(())
     }
 }
 
 impl Variant {
-    /// `reads_list`: the list of pixels is there to be read, not to be made.
-    fn new(gpu: &GpuContext, key: PipelineKey, file: &str, entry_point: &str, reads_list: bool) -> Result<Self, ComposeError> {
+    fn new(gpu: &GpuContext, key: PipelineKey, file: &str, entry_point: &str, lists: Lists) -> Result<Self, ComposeError> {
         let module = shaders::module(&gpu.device, "camsim.reverse", file, &key.slots())?;
-        let groups = layouts(key, reads_list).map(|entries| {
+        let groups = layouts(key, lists).map(|entries| {
             (!entries.is_empty()).then(|| {
                 gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("camsim.reverse"), entries: &entries })
             })
@@ -176,7 +199,7 @@ impl Variant {
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             cache: None,
         });
-        Ok(Self { pipeline, groups })
+        Ok(Self { pipeline, groups, lists })
     }
 
     fn set(&self, pass: &mut wgpu::ComputePass<'_>, groups: &Groups) {
@@ -209,7 +232,13 @@ impl Variant {
         }
         resources[2].extend(b.lens_map.map(|map| (0, view(map))));
         resources[3].extend(b.out_truth.map(|truth| (1, truth.as_entire_binding())));
-        resources[3].extend(b.listed.map(|listed| (2, listed.as_entire_binding())));
+        if let Some([candidates, listed]) = b.lists.map(|lists| lists.each_ref().map(wgpu::Buffer::as_entire_binding)) {
+            match self.lists {
+                Lists::Fills => resources[3].push((2, candidates)),
+                Lists::Thins => resources[3].extend([(2, listed), (3, candidates)]),
+                Lists::Reads => resources[3].push((2, listed)),
+            }
+        }
         let mut groups = [const { None }; 4];
         for (i, resources) in resources.into_iter().enumerate() {
             groups[i] = self.groups[i].as_ref().map(|layout| {
@@ -221,7 +250,7 @@ impl Variant {
     }
 }
 
-fn layouts(key: PipelineKey, reads_list: bool) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
+fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 4] {
     let entry = |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None };
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
@@ -254,7 +283,8 @@ fn layouts(key: PipelineKey, reads_list: bool) -> [Vec<wgpu::BindGroupLayoutEntr
         out.push(entry(1, storage(false)));
     }
     if key.edges != EdgeKind::None {
-        out.push(entry(2, storage(reads_list)));
+        out.push(entry(2, storage(lists == Lists::Reads)));
+        out.extend((lists == Lists::Thins).then(|| entry(3, storage(true))));
     }
     [frame, ideal, lens, out]
 }

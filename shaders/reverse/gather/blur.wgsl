@@ -29,6 +29,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     var inside = true;
     var tap = 0u;
     var source = first_node(pixel, ray);
+    let first_far_px = source.far_px;
     for (var k = 0u; k < stretches; k++) {
         let curve = curve_from(source, pixel, ray, k * nodes_of_stretch());
         inside = inside && curve.inside;
@@ -41,7 +42,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
         sum += part / f32(count);
         source = curve.end;
     }
-    return Gathered(sum / f32(stretches), inside);
+    return Gathered(sum / f32(stretches), inside, array(first_far_px, source.far_px));
 }
 
 // Source at exposure phase in [-0.5, 0.5], on the very path that `gather` samples.

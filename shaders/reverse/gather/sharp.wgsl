@@ -9,7 +9,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     for (var i = 0u; i < taps; i++) {
         sum += tap_color(area, source.at_px, i);
     }
-    return Gathered(sum / f32(taps), source.inside);
+    return Gathered(sum / f32(taps), source.inside, array(source.far_px, source.far_px));
 }
 
 // Source at exposure phase in [-0.5, 0.5]: without exposure all phases are one.

@@ -29,12 +29,12 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     for (var i = 0u; i < frame.max_samples; i++) {
         sum += textureSampleLevel(ideal_color, ideal_sampler, mix(first_at, last_at, sample_share(i)), 0.0).rgb;
     }
-    return Gathered(vec4<f32>(sum / f32(frame.max_samples), 1.0), ends.inside);
+    return Gathered(vec4<f32>(sum / f32(frame.max_samples), 1.0), ends.inside, array(ends.first_px, ends.last_px));
 }
 
 // Source at exposure phase in [-0.5, 0.5], on the very path that `gather` samples.
 fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
     let ends = exposure_ends(pixel, ray);
     let at_px = mix(ends.first_px, ends.last_px, clamp(phase + 0.5, 0.0, 1.0));
-    return Source(at_px, 0.0, ends.inside);
+    return Source(at_px, 0.0, ends.inside, at_px);
 }

@@ -33,7 +33,8 @@ fn image_rate(uv: vec2<f32>, w: f32) -> vec2<f32> {
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let found = constant_depth(frame.ideal_focal_px * uv + frame.ideal_principal_px);
     let at_px = frame.ideal_focal_px * displaced(uv, found, pose.dt_s) + frame.ideal_principal_px;
-    return Source(at_px, found, inside_ideal(at_px));
+    let far_px = ideal_px_from_point(point_at(uv, pose, 0.0));
+    return Source(at_px, found, inside_ideal(at_px), far_px);
 }
 
 // A pixel keeps the depth of its own place only to find where it looks. The depth that it reports is what the ideal frame has there, less what the

@@ -19,7 +19,7 @@ fn mix_pose(a: Pose, b: Pose, t: f32) -> Pose {
 
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let at_px = frame.ideal_focal_px * uv + frame.ideal_principal_px;
-    return Source(at_px, 0.0, inside_ideal(at_px));
+    return Source(at_px, 0.0, inside_ideal(at_px), at_px);
 }
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {

@@ -6,4 +6,6 @@ struct Source {
     inverse_depth: f32,
     // In front of the key camera and inside the ideal frame.
     inside: bool,
+    // Where it would look if what it sees were infinitely far, ideal pixels.
+    far_px: vec2<f32>,
 }

@@ -38,7 +38,7 @@ fn depth_on_line(direction: vec3<f32>, shift: vec3<f32>, found: f32, guess: f32)
 fn source_at(direction: vec3<f32>, shift: vec3<f32>, w: f32) -> Source {
     let in_key = direction + w * shift;
     let at_px = ideal_px_from_point(in_key);
-    return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px));
+    return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px), ideal_px_from_point(direction));
 }
 
 // The key frame's inverse depth that the last of some look-ups finds, the first of which takes it to be `guess`, 1/m.

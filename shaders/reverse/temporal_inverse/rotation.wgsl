@@ -5,7 +5,7 @@
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let in_key = rotate(pose, vec3<f32>(uv, 1.0));
     let at_px = ideal_px_from_point(in_key);
-    return Source(at_px, 0.0, in_key.z > 0.0 && inside_ideal(at_px));
+    return Source(at_px, 0.0, in_key.z > 0.0 && inside_ideal(at_px), at_px);
 }
 
 fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {

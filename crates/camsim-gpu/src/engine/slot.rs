@@ -75,9 +75,9 @@ pub(super) fn pose_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
     })
 }
 
-pub(super) fn list_buffer(gpu: &GpuContext, size_px: [u32; 2]) -> wgpu::Buffer {
+pub(super) fn list_buffer(gpu: &GpuContext, label: &str, size_px: [u32; 2]) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.listed"),
+        label: Some(label),
         size: list_size(size_px),
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::INDIRECT | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,

@@ -246,14 +246,14 @@ mod tests {
 
     use super::*;
     use crate::{
-        reverse::{RAYS_SHADER, SHADER},
+        reverse::{CANDIDATES_SHADER, RAYS_SHADER, SHADER},
         shaders,
     };
 
     #[test]
     fn every_variant_is_valid_without_any_capability() {
         let texts = PipelineKey::all().into_iter().flat_map(|key| {
-            let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, RAYS_SHADER] };
+            let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER] };
             files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
         let surfaces = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].into_iter().flat_map(|file| {
