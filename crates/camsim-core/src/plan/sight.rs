@@ -115,7 +115,7 @@ mod tests {
             rate_body_rad_s: DVec3::new(0.1, -0.2, 0.3),
             angular_acceleration_body_rad_s2: DVec3::ZERO,
         };
-        let trajectory = Trajectory::uniform(-1.0, 4.0, 4.0, vec![first]).unwrap();
+        let trajectory = Trajectory::uniform(-1.0, 4.0, 3.0, vec![first]).unwrap();
         let path = Arc::new(CameraPath::new(trajectory, &scenario.camera.mount).unwrap());
         let scene = Arc::new(scene);
         Arc::new(Sequence { scenario, path, epoch_ns: 0, start_s: 0.0, frames: 9, scene, vignette: None, zoom_track: Vec::new() })
