@@ -1,5 +1,6 @@
 // The pixels that the reverse pass has listed: those that see several surfaces get the mean of rays of their own instead of what was gathered
-// plainly; depth and coordinates are those of the surface that the pixel's own ray meets. Slots as in reverse.wgsl.
+// plainly; depth and coordinates are those of the surface that the pixel's own ray meets, which the host tells for solvers that look where it
+// is. Slots as in reverse.wgsl.
 #import common/frame.wgsl
 #import common/noise.wgsl
 #import reverse/ideal_frame.wgsl
@@ -39,6 +40,6 @@ fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
         emit(pixel, output_color(photometric(pixel, after_gather(ray, color), vignette_weight(pixel))));
     }
     if (EMITS_RAYS) {
-        emit_truth(pixel, ray, seen_px_at_phase(pixel, ray, frame.coords_phase), seen_mid(pixel, ray));
+        emit_centre(pixel, ray);
     }
 }

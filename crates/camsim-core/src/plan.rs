@@ -35,6 +35,7 @@ mod motion;
 pub mod paper;
 mod probes;
 mod rounding;
+mod sight;
 mod stages;
 mod surfaces;
 mod transfer;
@@ -48,6 +49,7 @@ pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
+pub use sight::Sight;
 pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, TemporalStage};
 
 /// Nearest distance that the ideal frame can show, metres.

@@ -43,7 +43,7 @@ use ahead::{Ahead, Prepared, Preparer};
 pub use error::RenderError;
 use error::RenderErrorBase;
 pub use inspect::IdealImages;
-use readback::{Output, coords, read_mapped};
+use readback::{Output, coords, look_for_unknown, read_mapped};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
@@ -208,7 +208,7 @@ pub struct FrameTimes {
     pub submit_ms: f64,
     /// The host waited for the device.
     pub wait_ms: f64,
-    /// The host took the pictures.
+    /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what pixels at silhouettes see.
     pub read_ms: f64,
     /// What ran on the device, if asked for ([`Session::time_passes`]) and if the adapter has time stamps.
     pub passes: Vec<PassTime>,
@@ -455,8 +455,11 @@ impl Session<'_> {
         let begun = Instant::now();
         let slot = &self.slots[done.slot];
         let color_rgba = slot.color.read()?;
-        let truth = slot.truth.as_ref().map(Output::read::<Truth>).transpose()?;
+        let mut truth = slot.truth.as_ref().map(Output::read::<Truth>).transpose()?;
         let plan = done.plan;
+        if let Some(truth) = truth.as_mut().filter(|_| plan.looks_for_itself()) {
+            look_for_unknown(truth, &self.planner, &plan, f64::from(self.coords_phase));
+        }
         let size_px = plan.camera.size_px;
         let frame = RenderedFrame {
             index: plan.frame,

@@ -4,6 +4,7 @@ mod common;
 
 use camsim_core::{
     plan::EdgeStage,
+    reference::Oracle,
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     scene::{Scene, Terrain},
     temporal::edges::{KeyView, Keys, gather_edges},
@@ -135,6 +136,35 @@ fn ridges() -> Scene {
         terrain: Some(Terrain::from_heights(129, 129, 10.0, &heights, Some(texture)).expect("a terrain")),
         sky_linear: [1.0, 1.0, 1.0],
         ..Scene::default()
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn depths_of_ridges_before_ridges_and_sky_are_those_of_one_of_them() {
+    let mut scenario = camera();
+    scenario.quality.max_terrain_error_px = 0.02;
+    scenario.camera.size_px = [120, 90];
+    scenario.camera.focal_px = [96.0, 96.0];
+    scenario.camera.mount.angles_deg = [4.0, -12.0, 0.0];
+    scenario.camera.shutter = rolling(10.0);
+    let engine = engine();
+    for (name, velocity, turn) in [("still", DVec3::ZERO, DVec3::ZERO), ("turning", DVec3::ZERO, TURN), ("flying", EAST, TURN)] {
+        let sequence = sequence(scenario.clone(), steady(110.0, 0.0, velocity, turn), ridges());
+        let done = render(&engine, &sequence, &[Channel::Depth], 0);
+        let oracle = Oracle::new(sequence).expect("a usable camera");
+        let view = oracle.view(0);
+        let depths = done.frame.depth_m.as_ref().expect("asked for");
+        let (mut worst, mut sky) = (0.0_f64, 0);
+        for (i, found) in (0..).zip(depths).map(|(i, found)| (i, f64::from(*found))) {
+            let hit = view.look([i % 120, i / 120], DVec2::ZERO, 0.0).and_then(|look| look.hit);
+            let true_m = hit.map_or(0.0, |hit| hit.depth_m);
+            worst = worst.max((found - true_m).abs() / found.max(true_m).max(1e-9));
+            sky += u32::from(hit.is_none());
+        }
+        eprintln!("{name}: {:?}, depth off by {worst:.1e} at most", done.plan.temporal);
+        // A step is more; a bend within a pixel less than the marks ask for.
+        assert!(worst < 0.01 && (1000..9000).contains(&sky), "{name}: {worst:.1e}, {sky} px of sky");
     }
 }
 

@@ -167,6 +167,16 @@ fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
     return centre_seen(pixel, ray, 0.5);
 }
 
+// Samples know where a surface ends to a few hundredths of a pixel, and keys do not show all of it: a ray in f64 knows.
+fn emit_centre(pixel: vec2<u32>, ray: Ray) {
+    use_key_of_line(pixel);
+    if (!IS_EXACT) {
+        emit_truth(pixel, ray, seen_px_at_phase(pixel, ray, frame.coords_phase), seen_mid(pixel, ray));
+    } else if (near_edge(ray.uv, pose_mid(pixel)) || near_edge(ray.uv, pose_along(pixel, frame.coords_phase + 0.5))) {
+        emit_unknown(pixel, ray);
+    }
+}
+
 struct Met {
     // Where the colour of what the ray meets is, ideal pixels of the chosen key.
     at_px: vec2<f32>,

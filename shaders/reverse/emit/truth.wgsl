@@ -10,7 +10,7 @@ struct Truth {
     source_px: vec2<f32>,
     // The ray's point in NED at mid-exposure, metres; NaN-free: 0 where nothing is.
     point_ned_m: vec3<f32>,
-    // Planar depth in the line's own camera at mid-exposure, metres; 0 = nothing there.
+    // Planar depth in the line's own camera at mid-exposure, metres; 0 = nothing there; below 0: not known, the host casts a ray.
     depth_m: f32,
 }
 
@@ -31,6 +31,11 @@ fn emit_truth(pixel: vec2<u32>, ray: Ray, source_px: vec2<f32>, mid: Seen) {
             + p.x * frame.ned_from_key_x.xyz + p.y * frame.ned_from_key_y.xyz + p.z * frame.ned_from_key_z.xyz;
     }
     out_truth[pixel.y * frame.size_px.x + pixel.x] = truth;
+}
+
+// Of what a ray in f64 is to tell.
+fn emit_unknown(pixel: vec2<u32>, ray: Ray) {
+    out_truth[pixel.y * frame.size_px.x + pixel.x] = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), -1.0);
 }
 
 fn emit_invalid(pixel: vec2<u32>) {

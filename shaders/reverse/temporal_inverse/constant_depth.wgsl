@@ -49,6 +49,8 @@ fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
 }
 
 const HAS_PARALLAX: bool = true;
+// Where it looks is not where the point truly is.
+const IS_EXACT: bool = false;
 
 fn point_at(uv: vec2<f32>, pose: Pose, w: f32) -> vec3<f32> {
     return vec3<f32>(displaced(uv, w, pose.dt_s), 1.0);

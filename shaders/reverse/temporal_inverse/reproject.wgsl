@@ -61,6 +61,8 @@ fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
 }
 
 const HAS_PARALLAX: bool = true;
+// It looks where the point truly is.
+const IS_EXACT: bool = true;
 
 // The point at inverse planar depth w of a ray, in the key camera, times w.
 fn point_at(uv: vec2<f32>, pose: Pose, w: f32) -> vec3<f32> {

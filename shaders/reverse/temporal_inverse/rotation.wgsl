@@ -17,6 +17,8 @@ fn temporal_inverse_with_depth(uv: vec2<f32>, pose: Pose) -> Source {
 
 // Depth does not matter: every point of a ray has the same source.
 const HAS_PARALLAX: bool = false;
+// It looks where the point truly is.
+const IS_EXACT: bool = true;
 
 fn point_at(uv: vec2<f32>, pose: Pose, w: f32) -> vec3<f32> {
     return rotate(pose, vec3<f32>(uv, 1.0));

@@ -141,6 +141,9 @@ impl FramePlan {
             passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
         }
         passes.push("readback".to_owned());
+        if self.looks_for_itself() {
+            passes.push("host: a ray in f64 for depth and coordinates of each pixel that may see a silhouette".to_owned());
+        }
         passes
     }
 

@@ -49,8 +49,8 @@ pub(super) fn nearest_first(keys: &[KeyFrame], t_s: f64) -> Vec<&KeyFrame> {
 ///
 /// A second one mends most of the holes: only lines near the ends of the window see strips then, and half as wide ones. It takes as long as
 /// the first, so it is for holes that would be a large part of either tolerance: of `quality.max_error_dn` by their colours, which is an RMS
-/// over the picture, or of `quality.max_error_px` by their coordinates, which are off by as much as the strips are wide, and may be so in
-/// a hundredth of the pixels.
+/// over the picture, or of `quality.max_error_px` by the places that these are read from, which are off by as much as the strips are
+/// wide, and may be so in a hundredth of the pixels.
 pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> u32 {
     let mut one = |reason: String| {
         skipped.push(Skip { what: "second ideal frame", reason });
