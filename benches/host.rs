@@ -73,9 +73,9 @@ fn terrain(criterion: &mut Criterion, loaded: &Loaded) -> Outcome<()> {
     let focal_px = plan.ideal.focal_px.max_element();
     let mut measure = |name: &str, terrain: &Terrain, pose: &CameraPose| {
         let detail = || TerrainDetail::new(black_box(terrain), pose, plan.tangents(), focal_px, plan.terrain_error_px);
-        let lod = detail().mesh().lod;
+        let lod = detail().mesh_to_draw().lod;
         println!("{name}: {} triangles of {} chunks, within {:.3} px", lod.triangles, lod.chunks, lod.max_error_px);
-        group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| bencher.iter(|| detail().mesh()));
+        group.bench_function(BenchmarkId::new("triangles of a frame", name), |bencher| bencher.iter(|| detail().mesh_to_draw()));
     };
     if let Some(terrain) = &sequence.scene.terrain {
         measure("demo", terrain, &plan.key_pose);

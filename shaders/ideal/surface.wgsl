@@ -70,8 +70,9 @@ fn version_for(cell: f32) -> Version {
     let close = cell <= CLOSE_TEXELS;
     let variance = select(CELL_VARIANCE * cell * cell, 0.0, close);
     let texels2 = variance / 3.0 + 1.0;
-    let below = floor(0.5 * log2(texels2));
-    let level = below + (texels2 * exp2(-2.0 * below) - 1.0) / 3.0;
+    // Half of its exponent, rounded down, and 4 to the minus that: by bits, since logarithms cost as much as a read on llvmpipe. Not below 1.
+    let below = ((bitcast<u32>(texels2) >> 23u) - 127u) >> 1u;
+    let level = f32(below) + (texels2 * bitcast<f32>((127u - 2u * below) << 23u) - 1.0) / 3.0;
     // Exactly 0 needs one version instead of two.
     return Version(variance, select(level, 0.0, close));
 }

@@ -7,7 +7,11 @@ use camsim_core::{
     reference::Oracle,
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     scene::{Scene, Terrain},
-    temporal::edges::{KeyView, Keys, gather_edges},
+    temporal::{
+        edges::{KeyView, Keys, gather_edges},
+        fine::Centre,
+        marks::marks,
+    },
     trajectory::Trajectory,
 };
 use camsim_gpu::engine::Finished;
@@ -202,6 +206,32 @@ fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
     let near = session.triangles_near_marks().expect("readable").expect("drawn");
     eprintln!("{near} of {all} triangles");
     assert!(near > 0 && 2 * near < all, "{near} of {all}");
+}
+
+/// The marks that a frame's colour carries, against the twin's on the depth of the same frame: over tiles, workgroups and the frame's borders.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn marks_are_their_twins() {
+    let mut scenario = camera();
+    scenario.camera.size_px = [313, 241];
+    scenario.camera.mount.angles_deg = [4.0, -35.0, 0.0];
+    let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
+    let engine = engine();
+    let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
+    session.render::<std::convert::Infallible>([0], &mut |_| Ok(())).expect("render");
+    let (ideal, color, inverse_depth) = session.read_ideal().expect("readable").expect("drawn");
+    assert!(ideal.size_px.iter().all(|side| !side.is_multiple_of(16)), "{:?}", ideal.size_px);
+    let centres: Vec<_> = inverse_depth.iter().map(|&w| Centre { inverse_depth: f64::from(w), color: DVec3::ZERO }).collect();
+    let expected = marks(ideal.size_px, 1, &centres, &[]);
+    let found = color.chunks_exact(4).map(|c| c[3] < 1.0);
+    let (mut marked, mut differ) = (0, 0);
+    for (expected, found) in expected.into_iter().zip(found) {
+        marked += usize::from(expected);
+        differ += usize::from(expected != found);
+    }
+    eprintln!("{marked} of {} pixels are marked, {differ} otherwise than by the twin", inverse_depth.len());
+    // Steps that are a threshold's to seven digits.
+    assert!(marked > 500 && differ <= 2, "{marked} {differ}");
 }
 
 #[test]

@@ -19,3 +19,12 @@ fn is_thin(pixel: vec2<i32>, slope: f32, edge_step: f32) -> bool {
     }
     return (low == 0.0 && high > 0.0) || high - low > slope + edge_step * high;
 }
+
+// Of 2x2 pixels, as in ideal/marks.wgsl.
+fn are_thin(pixel: vec2<i32>, within: vec4<bool>, slope: vec4<f32>, edge_step: f32) -> vec4<bool> {
+    var thin = vec4<bool>(false);
+    for (var k = 0; k < 4; k++) {
+        thin[k] = within[k] && is_thin(pixel + vec2<i32>(k & 1, k >> 1u), slope[k], edge_step);
+    }
+    return thin;
+}

@@ -64,6 +64,8 @@ struct Tracker {
 #[derive(Serialize)]
 pub(super) struct LevelOfDetail {
     pub(super) triangles: u64,
+    /// Triangles in sight that are left out because they face away.
+    pub(super) away: u64,
     /// Bound on how far the drawn terrain is from the full one, px of the ideal frame.
     pub(super) max_error_px: f64,
     pub(super) tolerance_px: f64,
@@ -116,9 +118,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
-    if let Some(LevelOfDetail { triangles, max_error_px, tolerance_px }) = level_of_detail {
+    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px }) = level_of_detail {
         console.line("terrain in this frame")?;
         console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;
+        if away > 0 {
+            console.line(format_args!("  {away} more face away and are not drawn: from above they are hidden"))?;
+        }
     }
     Ok(())
 }
@@ -127,8 +132,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let tolerance_px = plan.terrain_error_px;
-    let lod = TerrainDetail::new(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px).mesh().lod;
-    Some(LevelOfDetail { triangles: lod.triangles, max_error_px: lod.max_error_px, tolerance_px })
+    let detail = TerrainDetail::new(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
+    let lod = detail.mesh_to_draw().lod;
+    Some(LevelOfDetail { triangles: lod.triangles, away: lod.away, max_error_px: lod.max_error_px, tolerance_px })
 }
 
 fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Failure> {

@@ -18,6 +18,7 @@ mod detail;
 #[cfg(test)]
 mod drawn_tests;
 mod errors;
+mod facing;
 mod lattice;
 mod query;
 mod select;

@@ -94,7 +94,7 @@ impl Preparer {
         let focal_px = plan.ideal.focal_px.max_element();
         let terrain = self.planner.sequence().scene.terrain.iter();
         let meshes = terrain.flat_map(|terrain| {
-            view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh())
+            view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh_to_draw())
         });
         let meshes: Arc<[TerrainMesh]> = meshes.collect();
         *seen() = Some((view, meshes.clone()));

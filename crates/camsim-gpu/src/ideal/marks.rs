@@ -1,6 +1,6 @@
 //! Marks of silhouettes in an ideal frame, the borders of surfaces within marked pixels, and what lies within reach of each place.
 
-use camsim_core::plan::FramePlan;
+use camsim_core::plan::{FramePlan, SIZE_QUANTUM_PX};
 
 use super::{
     COLOR_FORMAT, IdealTarget,
@@ -15,6 +15,9 @@ use crate::{
 
 /// A packed normal and offset, and the depth value between the surfaces.
 pub(super) const LINES_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Uint;
+/// Side of the square of pixels that a workgroup of `shaders/ideal/marks.wgsl` takes: frames begin at multiples of it in their target.
+const MARKS_PX: u32 = 16;
+const _: () = assert!(SIZE_QUANTUM_PX.is_multiple_of(MARKS_PX) && MARKS_PX.is_multiple_of(TILE_PX));
 /// Tiles that a workgroup of `shaders/ideal/reach.wgsl` takes.
 const REACH_WORKGROUP: u32 = 64;
 /// Head of the list of marked tiles before a frame: a draw of strips of four vertices, none yet, and an empty dispatch.
@@ -112,7 +115,7 @@ impl MarksPass {
         let mut pass = recorder.compute_pass("marks");
         pass.set_pipeline(&self.marks[usize::from(thin)].pipeline);
         pass.set_bind_group(0, &groups.marks[usize::from(thin)], &[]);
-        pass.dispatch_workgroups(width.div_ceil(TILE_PX), (rows * last + height).div_ceil(TILE_PX), 1);
+        pass.dispatch_workgroups(width.div_ceil(MARKS_PX), (rows * last + height).div_ceil(MARKS_PX), 1);
     }
 
     /// Writes the marks into the frame's colour; once they are known.
@@ -202,7 +205,8 @@ fn compute_pipeline(
         layout: Some(&pipeline_layout(gpu, file, layout)),
         module: &module,
         entry_point: Some(entry_point),
-        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        // What a workgroup shares is set by the shader where it is not written whole.
+        compilation_options: wgpu::PipelineCompilationOptions { zero_initialize_workgroup_memory: false, ..Default::default() },
         cache: None,
     }))
 }

@@ -164,6 +164,11 @@ impl<'a> TerrainDetail<'a> {
         self.judge.max_error_px
     }
 
+    /// Where the camera is, and its focal length, pixels.
+    pub(super) fn seen_from(&self) -> (DVec3, f64) {
+        (self.judge.position_ned_m, self.judge.focal_px)
+    }
+
     /// What horizontal deviations, which no choice of triangles looks at one by one, move at most, pixels.
     pub(super) fn horizontal_px(&self) -> f64 {
         let largest_m = self.terrain.horizontal_m[NODE_CELLS.len() - 1];

@@ -137,6 +137,91 @@ fn nothing_in_sight_is_left_open() {
     }
 }
 
+/// Where a ray first meets one of some triangles: the parameter.
+fn first_met(triangles: &[[DVec3; 3]], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let met = triangles.iter().filter_map(|&triangle| Some(intersect_triangle(triangle, origin, direction, f64::INFINITY)?.0));
+    met.min_by(f64::total_cmp)
+}
+
+#[test]
+fn what_faces_away_is_never_what_is_seen() {
+    let mut random = Random(23);
+    let (mut away, mut kept, mut met, mut behind) = (0, 0, 0, 0);
+    // Slopes up to 1 and more, so that flat views meet many a slope from behind.
+    for (cols, rows) in [(129, 129), (102, 66)] {
+        let terrain = hills(cols, rows, 10.0, 70.0);
+        for _ in 0..6 {
+            let over = [random.within(-300.0, 300.0), random.within(-300.0, 300.0)];
+            let position = DVec3::new(over[0], over[1], terrain.down_at(over[0], over[1]).unwrap() - random.within(2.0, 90.0));
+            let camera = forward(position, random.within(0.0, 0.6));
+            let detail = TerrainDetail::new(&terrain, &camera, TANGENTS, FOCAL_PX, random.within(0.1, 2.0));
+            let (all, drawn) = (detail.mesh(), detail.mesh_to_draw());
+            assert_eq!(all.lod.triangles, drawn.lod.triangles + drawn.lod.away);
+            assert_eq!((all.lod.away, all.lod.max_error_px, &all.chunks), (0, drawn.lod.max_error_px, &drawn.chunks));
+            (away, kept) = (away + drawn.lod.away, kept + drawn.lod.triangles);
+            let corners = |mesh: &TerrainMesh| -> Vec<[DVec3; 3]> {
+                triangles(&terrain, mesh).into_iter().map(|t| t.map(|place| vertex_m(&terrain, place))).collect()
+            };
+            let (all, drawn) = (corners(&all), corners(&drawn));
+            for _ in 0..60 {
+                let uv = [random.within(TANGENTS[0], TANGENTS[1]), random.within(TANGENTS[2], TANGENTS[3])];
+                let direction = camera.ned_from_camera * DVec3::new(uv[0], uv[1], 1.0);
+                let seen = first_met(&all, position, direction);
+                assert_eq!(seen, first_met(&drawn, position, direction));
+                met += usize::from(seen.is_some());
+                // Rays that go on meet what faces away: there is something to be seen wrongly.
+                let on = seen.and_then(|t| first_met(&all, position + (t + 1e-3) * direction, direction));
+                behind += usize::from(on.is_some());
+            }
+        }
+    }
+    eprintln!("{away} of {} triangles face away; {met} rays meet the ground, {behind} go on to meet it again", away + kept);
+    assert!(6 * away > kept && met > 300 && behind > 60, "{away} {kept} {met} {behind}");
+}
+
+#[test]
+fn all_is_drawn_where_an_underside_can_be_seen() {
+    let heights = hill_heights(129, 129, 70.0);
+    let whole = Terrain::from_heights(129, 129, 10.0, &heights, None).unwrap();
+    let drawn = |terrain: &Terrain, position: DVec3| {
+        let detail = TerrainDetail::new(terrain, &forward(position, 0.2), TANGENTS, FOCAL_PX, 0.25);
+        (detail.mesh_to_draw().lod, detail.mesh().lod)
+    };
+    let above = DVec3::new(-300.0, 0.0, whole.down_at(-300.0, 0.0).unwrap() - 20.0);
+    let (to_draw, all) = drawn(&whole, above);
+    assert!(to_draw.away > 100 && to_draw.triangles < all.triangles);
+    // Below the ground; beside it, where its end is a cliff with nothing in front.
+    for position in [above + DVec3::new(0.0, 0.0, 40.0), DVec3::new(-700.0, 0.0, -20.0)] {
+        let (to_draw, all) = drawn(&whole, position);
+        assert_eq!(to_draw, all);
+        assert!(all.triangles > 100);
+    }
+    // A gap to look through.
+    let mut holed = heights.clone();
+    holed[64 * 129 + 64] = f64::NAN;
+    let (to_draw, all) = drawn(&Terrain::from_heights(129, 129, 10.0, &holed, None).unwrap(), above);
+    assert_eq!(to_draw, all);
+    // A border that bends inwards far away, as a circle of latitude does: a ray along it leaves the ground and comes back.
+    let bent = |bend_m: f64| {
+        let at = |k: usize| [(k % 129) as f64 - 64.0, 64.0 - (k / 129) as f64];
+        let points: Vec<_> = heights
+            .iter()
+            .enumerate()
+            .map(|(k, height)| {
+                let [east, north] = at(k);
+                DVec3::new(10.0 * north + bend_m * (east / 64.0).powi(2), 10.0 * east, -height)
+            })
+            .collect();
+        let texture = std::sync::Arc::new(Texture::uniform([255; 4], crate::scene::Encoding::Srgb));
+        Terrain::new(129, 129, &points, &vec![[0.0; 2]; points.len()], texture).unwrap()
+    };
+    let near_border = DVec3::new(635.0, -500.0, -500.0);
+    assert!(bent(0.0).is_seen_from_above(near_border));
+    assert!(!bent(60.0).is_seen_from_above(near_border));
+    // From the middle no side of that border is seen from outside.
+    assert!(bent(60.0).is_seen_from_above(DVec3::new(0.0, 0.0, -500.0)));
+}
+
 #[test]
 fn nothing_is_left_open_from_anywhere() {
     let terrain = hills(140, 140, 10.0, 25.0);

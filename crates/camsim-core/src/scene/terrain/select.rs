@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::{
     TerrainDetail, TerrainHit,
     detail::Tolerances,
+    facing::Facing,
     lattice::{self, BLOCK_DEPTH, DEPTHS, LATTICE, Lattice, NODE_CELLS, ROOTS, SIDE, VERTICES},
 };
 
@@ -17,8 +18,10 @@ pub const VERTEX_BITS: u32 = 13;
 pub struct LodSelection {
     /// Chunks in sight.
     pub chunks: usize,
-    /// Triangles in sight.
+    /// Triangles in sight that are drawn.
     pub triangles: u64,
+    /// Triangles in sight that are not, because they face away.
+    pub away: u64,
     /// Bound on the displacement of any visible surface point in the ideal frame, pixels.
     pub max_error_px: f64,
 }
@@ -35,9 +38,18 @@ pub struct TerrainMesh {
 }
 
 impl TerrainDetail<'_> {
-    /// The triangles to draw, in the order of the chunks.
+    /// All triangles in sight, those of the nearest chunks first.
     pub fn mesh(&self) -> TerrainMesh {
-        let parts: Vec<(Vec<u32>, Option<i32>)> = self
+        self.mesh_of(false)
+    }
+
+    /// The triangles to draw: all in sight, but those that face away where none of these can be seen.
+    pub fn mesh_to_draw(&self) -> TerrainMesh {
+        self.mesh_of(self.terrain.is_seen_from_above(self.seen_from().0))
+    }
+
+    fn mesh_of(&self, from_above: bool) -> TerrainMesh {
+        let parts: Vec<ChunkPart> = self
             .in_sight
             .par_iter()
             .enumerate()
@@ -45,16 +57,18 @@ impl TerrainDetail<'_> {
                 || Tolerances::new(0),
                 |known, (place, &chunk)| {
                     known.reset(chunk);
-                    self.chunk_mesh(known, place as u32, chunk)
+                    self.chunk_part(known, place as u32, chunk, from_above)
                 },
             )
             .collect();
-        let nearest = parts.iter().filter_map(|part| part.1).max();
-        let mut indices = Vec::with_capacity(parts.iter().map(|part| part.0.len()).sum());
-        parts.iter().for_each(|part| indices.extend_from_slice(&part.0));
+        let nearest = parts.iter().filter_map(|part| part.nearest).max();
+        let mut indices = Vec::with_capacity(parts.iter().map(|part| part.indices.len()).sum());
+        // Pixels are then coloured once, nearly: what is drawn later is hidden.
+        nearest_first(&parts).into_iter().for_each(|part| indices.extend_from_slice(&part.indices));
         let lod = LodSelection {
             chunks: self.in_sight.len(),
             triangles: indices.len() as u64 / 3,
+            away: parts.iter().map(|part| part.away).sum(),
             max_error_px: nearest.map_or(0.0, |steps| self.error_px(steps)),
         };
         TerrainMesh { chunks: self.in_sight.clone(), indices, lod }
@@ -67,10 +81,11 @@ impl TerrainDetail<'_> {
         (share * self.max_error_px() + self.horizontal_px()).min(self.max_error_px())
     }
 
-    fn chunk_mesh(&self, known: &Tolerances, place: u32, chunk: u32) -> (Vec<u32>, Option<i32>) {
-        let mut walk = Walk { judged: Judged::new(self, known, chunk), emit: Emit::new(self, place, chunk), nearest: None };
+    fn chunk_part(&self, known: &Tolerances, place: u32, chunk: u32, from_above: bool) -> ChunkPart {
+        let mut walk = Walk { judged: Judged::new(self, known, chunk), emit: Emit::new(self, place, chunk, from_above), nearest: None };
         ROOTS.into_iter().for_each(|root| walk.triangle(root, 0));
-        (walk.emit.indices, walk.nearest)
+        let distance_m = self.terrain.chunks[chunk as usize].bounds.distance_m(self.seen_from().0);
+        ChunkPart { indices: walk.emit.indices, away: walk.emit.away, nearest: walk.nearest, distance_m }
     }
 
     /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn there instead: the plane of that over or
@@ -115,6 +130,23 @@ impl TerrainDetail<'_> {
         }
         best.1
     }
+}
+
+/// What one chunk adds.
+struct ChunkPart {
+    indices: Vec<u32>,
+    /// Triangles that face away and were left out.
+    away: u64,
+    /// As [`Walk::nearest`].
+    nearest: Option<i32>,
+    /// From the camera to the chunk's box.
+    distance_m: f64,
+}
+
+fn nearest_first(parts: &[ChunkPart]) -> Vec<&ChunkPart> {
+    let mut ordered: Vec<_> = parts.iter().collect();
+    ordered.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+    ordered
 }
 
 /// Errors of one chunk's vertices and cells, and what they may be.
@@ -217,6 +249,9 @@ fn north_west([a, b, _]: [u32; 3]) -> u32 {
 struct Emit<'a> {
     indices: Vec<u32>,
     base: u32,
+    /// Tells what faces away, if that is left out.
+    facing: Option<Facing<'a>>,
+    away: u64,
     /// For a chunk that is smaller than the lattice or has voids: what its vertices are.
     odd: Option<OddChunk<'a>>,
 }
@@ -227,19 +262,17 @@ struct OddChunk<'a> {
 }
 
 impl<'a> Emit<'a> {
-    fn new(detail: &'a TerrainDetail<'_>, place: u32, chunk: u32) -> Self {
+    fn new(detail: &'a TerrainDetail<'_>, place: u32, chunk: u32, from_above: bool) -> Self {
         let terrain = detail.terrain;
         let of = &terrain.chunks[chunk as usize];
         let is_odd = of.cells != [SIDE - 1; 2] || of.has_voids;
         let odd = is_odd.then(|| OddChunk { cells: of.cells, vertices: &terrain.vertices[of.first_vertex as usize..] });
-        Self { indices: Vec::new(), base: place << VERTEX_BITS, odd }
+        let facing = from_above.then(|| Facing::new(detail, chunk));
+        Self { indices: Vec::new(), base: place << VERTEX_BITS, facing, away: 0, odd }
     }
 
     fn triangle(&mut self, triangle: [u32; 3]) {
-        let Some(odd) = &self.odd else {
-            self.indices.extend_from_slice(&triangle.map(|vertex| self.base | vertex));
-            return;
-        };
+        let Some(odd) = &self.odd else { return self.vertices(triangle) };
         let places = triangle.map(|vertex| {
             let [i, j] = lattice::place(vertex);
             [i.min(odd.cells[0]), j.min(odd.cells[1])]
@@ -248,7 +281,16 @@ impl<'a> Emit<'a> {
         let [a, b, c] = places.map(|place| place.map(i64::from));
         let has_area = (b[0] - a[0]) * (c[1] - a[1]) != (b[1] - a[1]) * (c[0] - a[0]);
         if has_area && vertices.iter().all(|&vertex| !odd.vertices[vertex as usize].offset_m[0].is_nan()) {
-            self.indices.extend(vertices.map(|vertex| self.base | vertex));
+            self.vertices(vertices);
+        }
+    }
+
+    /// A triangle by its vertices' places in the chunk.
+    fn vertices(&mut self, triangle: [u32; 3]) {
+        if self.facing.as_ref().is_some_and(|facing| facing.is_away(triangle)) {
+            self.away += 1;
+        } else {
+            self.indices.extend_from_slice(&triangle.map(|vertex| self.base | vertex));
         }
     }
 }
