@@ -224,6 +224,28 @@ fn random_frames_stay_within_their_prediction() {
     assert!(median <= 5.0, "the prediction is {median} times the error in the median");
 }
 
+/// Two whole periods of the mount within the exposure: at its middle and ends the camera looks the same way, and depth looked up there says nothing of what is
+/// between. Long readouts make every line another phase.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn what_happens_between_the_ends_of_an_exposure_is_predicted() {
+    let engine = engine();
+    for readout_ms in [100.0, 300.0, 1000.0] {
+        let mut scenario = scenario();
+        scenario.camera.size_px = [160, 120];
+        scenario.camera.focal_px = [100.0, 100.0];
+        scenario.camera.mount.angles_deg = [0.0, -75.0, 0.0];
+        scenario.camera.mount.vibration =
+            vec![VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.4, amplitude_m: 0.0, hz: 200.0, phase_deg: 0.0 }];
+        scenario.camera.shutter = ShutterSpec { readout_ms, exposure_ms: 10.0, ..ShutterSpec::default() };
+        let sequence = sequence(scenario, steady(250.0, 0.0, DVec3::new(60.0, 20.0, 0.0), DVec3::new(0.0, 0.0, 0.2)), hills());
+        let Found { plan, worst, .. } = find(&engine, &sequence);
+        let (measured_px, predicted_px) = (worst.smooth.p99_px, plan.predicted.total_px);
+        eprintln!("{readout_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}; {:?} {:?}", plan.temporal, plan.blur);
+        assert!(measured_px <= predicted_px, "{readout_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}");
+    }
+}
+
 /// A tighter tolerance is kept, and costs look-ups.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]

@@ -113,6 +113,11 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Report, CompareError> {
             Ok(Report { total, files: vec![], only_in_a: vec![], only_in_b: vec![] })
         }
         (true, true) => compare_folders(a, b),
+        // What is not there is said to be missing before it is said to be no folder.
+        _ if !a.exists() || !b.exists() => {
+            let missing = if a.exists() { b } else { a };
+            Err(CompareError::Kind { a: a.into(), b: b.into(), message: format!("{} does not exist", missing.display()) })
+        }
         _ => Err(CompareError::Kind { a: a.into(), b: b.into(), message: "one is a folder; give two files or two folders".into() }),
     }
 }

@@ -27,7 +27,7 @@ pub struct Args {
     #[command(flatten)]
     scenario: ScenarioArgs,
     /// Frame number, from 0
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     frame: u64,
     /// Print JSON
     #[arg(long)]

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::{
     BlurStage, EdgeStage, Holes, KeyFrame, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
-    exposure::miss_px,
+    exposure::{MOST_STEPS, miss_px},
     levels::Expected,
     probes::{Probe, spacing_px},
     rounding::Rounding,
@@ -43,6 +43,11 @@ const BOUND_SHARE: f64 = 0.5;
 const CHEAP_RK2_STEPS: f64 = 2.0;
 /// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
 const SHARE_STEP: usize = 5;
+/// Phases of the exposure that the probes take turns in. On a shaking mount the middle and the ends may be whole periods apart, where nothing has
+/// moved: the last two then stand in no simple ratio to them.
+const PHASES: [f64; 5] = [0.0, -0.5, 0.5, -0.309, 0.191];
+/// As many of them do for a mount at rest.
+const AT_REST: usize = 3;
 /// Probes whose exposure is looked at.
 const MISS_PROBES: usize = 32;
 /// Polynomials of the path looked at for each of them.
@@ -187,7 +192,7 @@ impl Case<'_> {
         Some(TerrainDetail::new(terrain, self.key_pose, self.ideal.tangents(), self.ideal.focal_px.max_element(), max_error_px))
     }
 
-    /// With an exposure that shows, the probes take turns in trying its middle and both its ends.
+    /// With an exposure that shows, the probes take turns in trying its [`PHASES`].
     fn truths(&self) -> Truths<'_> {
         let trial = Trial {
             surfaces: self.surfaces,
@@ -200,7 +205,11 @@ impl Case<'_> {
             twist: self.key_twist,
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
         };
-        let phases: &[f64] = if self.blur.is_some() { &[0.0, -0.5, 0.5] } else { &[0.0] };
+        let phases = match self.blur {
+            None => &PHASES[..1],
+            Some(_) if self.sequence.path.highest_vibration_hz() > 0.0 => &PHASES[..],
+            Some(_) => &PHASES[..AT_REST],
+        };
         let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
         let looked = self.reach.probes.par_iter().enumerate().with_min_len(16).filter_map(look).collect();
         Truths { camera: &self.reach.camera, ray: self.ray, trial, looked }
@@ -342,12 +351,15 @@ impl Forecast<'_> {
         let void_share = 1.0 - probes as f64 / tried.max(1) as f64;
         let covered = probes > 0 && void_share <= MOST_VOID_SHARE;
         let kept = total_px <= max_error_px && covered;
+        let most = blur.is_some_and(|blur| blur.solved() > MOST_STEPS);
+        let at_most = if most { format!(", of which there are at most {}", MOST_STEPS + 1) } else { String::new() };
+        let nodes = format!("the path between the exposure's nodes{at_most}");
         let causes = [
             (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
             (depth_px, "depth between the pixels of the ideal frame"),
-            (nodes_px, "the path between the exposure's nodes"),
+            (nodes_px, nodes.as_str()),
         ];
         let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
         let in_the_way = match (kept, covered) {

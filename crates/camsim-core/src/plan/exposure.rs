@@ -16,7 +16,9 @@ const SHARP_PX: f64 = 0.1;
 /// Part of the tolerance that the path between nodes may miss.
 const SHARE: f64 = 0.5;
 /// Most steps from node to node.
-const MOST_STEPS: u32 = 64;
+pub(super) const MOST_STEPS: u32 = 256;
+/// Most steps of the straight lines that rays at silhouettes take.
+const MOST_STRAIGHT_STEPS: u32 = 64;
 /// Nodes for each period of the fastest vibration: straight lines take that many to be near it, and fewer than the other would not tell it from stillness.
 const STRAIGHT_PER_PERIOD: f64 = 8.0;
 const LEAST_PER_PERIOD: f64 = 4.0;
@@ -85,7 +87,7 @@ impl Exposed<'_> {
     pub fn with_poses_for_rays(&self, exposure: ExposurePath, quality: &QualitySpec) -> ExposurePath {
         let wanted = self.stretches(PathStage::Straight, STRAIGHT_PER_PERIOD, SHARE * quality.max_error_px);
         let steps = exposure.stretches * exposure.path.steps();
-        ExposurePath { stride: wanted.div_ceil(steps).min(MOST_STEPS / steps).max(1), ..exposure }
+        ExposurePath { stride: wanted.div_ceil(steps).min(MOST_STRAIGHT_STEPS / steps).max(1), ..exposure }
     }
 
     /// Periods of the fastest vibration within the exposure, where it bends the path.

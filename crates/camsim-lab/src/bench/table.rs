@@ -2,7 +2,10 @@
 
 use std::fmt::Write as _;
 
-use super::{BenchError, Report, Row, knobs::DEFAULT};
+use super::{
+    BenchError, Report, Row,
+    knobs::{DEFAULT, WHOLE},
+};
 use crate::{
     cases::Group,
     plot::{Plot, Series},
@@ -131,7 +134,10 @@ impl Report {
     fn checks(&self, text: &mut String) -> std::fmt::Result {
         writeln!(text, "\n### No point spends more time for more error\n")?;
         if self.violations.is_empty() {
-            writeln!(text, "Of the rows that the plan chose, none is beaten by another row of its case in both time and error.")?;
+            writeln!(
+                text,
+                "Of the rows that the plan chose, none is beaten by another row of its case in both time and error: by 2 % at least in nine tenths of the rounds, and clearly."
+            )?;
         }
         for violation in &self.violations {
             // What one of the two was not measured for is not compared.
@@ -208,14 +214,18 @@ impl Report {
         let over = |row: &Row| Some(row.smooth_p99_px? / row.predicted_px?);
         let all: Vec<_> = self.rows.iter().filter_map(|row| Some((row, over(row)?))).collect();
         worst("measured p99 over the predicted bound: at most 1", 1.0, true, "", all);
-        worst("all effects: at least 45 dB", 45.0, false, " dB", of(&[AllEffects], DEFAULT, &|row| row.psnr_db));
+        let of_whole = |knob: &str, value: &dyn Fn(&Row) -> Option<f64>| {
+            let rows = self.rows_of(&[AllEffects], knob).filter(|row| row.case == WHOLE);
+            rows.filter_map(|row| Some((row, value(row)?))).collect::<Vec<_>>()
+        };
+        worst("all effects: at least 45 dB", 45.0, false, " dB", of_whole(DEFAULT, &|row| row.psnr_db));
         for (what, knob) in [("", DEFAULT), (", 16 samples a pixel there", "silhouettes: 16 samples")] {
             worst(
                 &format!("all effects: at least 40 dB within 3 px of silhouettes{what}"),
                 40.0,
                 false,
                 " dB",
-                of(&[AllEffects], knob, &|row| row.edge_psnr_db),
+                of_whole(knob, &|row| row.edge_psnr_db),
             );
         }
         self.ablation_promises(&mut promises);
