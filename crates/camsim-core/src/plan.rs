@@ -313,8 +313,8 @@ impl Planner {
             let staged = |exposure| sampling.blur_stage(exposure, quality, motion.blur_px);
             let (blur, travel_m) = (exposure.map(staged), motion.travel_m);
             let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
-            let looks_behind = edges != EdgeStage::None && demanded != Some(TemporalStage::Linear);
-            let with_poses = |exposure| if looks_behind { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
+            let has_rays = edges != EdgeStage::None && demanded != Some(TemporalStage::Linear);
+            let with_poses = |exposure| if has_rays { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
             (exposure.map(with_poses).map(staged), edges)
         };
         let expected = prospect.expected(&sampling, blur);

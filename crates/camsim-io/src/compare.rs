@@ -275,6 +275,7 @@ mod tests {
             (a.join(exr), c.join(exr), "16x12 against 17x12"),
             (a.clone(), a.join(exr), "one is a folder"),
             (a.join("no.png"), a.join(png), "cannot read"),
+            (a.join("color"), b.join("nowhere"), "nowhere does not exist"),
             (a.join("color"), c.clone(), "no EXR or PNG of the same name"),
         ] {
             let error = compare_paths(&one, &other).unwrap_err().to_string();
