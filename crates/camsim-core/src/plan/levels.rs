@@ -45,10 +45,12 @@ const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
-/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], and a read of the spline. Rough, from frame times on
-/// llvmpipe; of an ideal pixel what is done for it beside the reads counts too (depth, silhouettes), so that reads are spent before pixels.
-const IDEAL_COSTS: [f64; 3] = [13.0, 14.0, 16.0];
-const SPLINE_COST: f64 = 6.0;
+/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], and a read of the spline. Rough, from the passes'
+/// times on llvmpipe (docs/PERFORMANCE.md). What silhouettes cost hardly depends on the ideal frame's scale: more samples, but fewer rays.
+const IDEAL_COSTS: [f64; 3] = [8.0, 10.5, 15.0];
+const SPLINE_COST: f64 = 7.0;
+/// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.
+const WORTH: f64 = 0.2;
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
 const FOG_AT_VISIBILITY: f64 = 3.912;
 
@@ -220,7 +222,8 @@ impl<'a> Prospect<'a> {
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
         let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share);
-        // Each with the fewest samples first: it may not be cheaper than that.
+        let price = |cost: f64, total_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / tolerance_dn));
+        // Each with the fewest samples first: it may not be cheaper than that, and without any error.
         let fewest = |sampling: &Sampling| way(*sampling, choices(sampling.scale).first().copied().unwrap_or(0.0));
         let mut ways: Vec<(f64, Sampling)> = scales
             .iter()
@@ -238,8 +241,8 @@ impl<'a> Prospect<'a> {
         let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;
         let mut cheapest: Option<(f64, Sampling)> = None;
         for (least_cost, sampling) in ways {
-            let below = cheapest.map_or(f64::INFINITY, |(cost, _)| cost);
-            if least_cost >= below {
+            let below = cheapest.map_or(f64::INFINITY, |(price, _)| price);
+            if price(least_cost, 0.0) >= below {
                 break;
             }
             // The most samples first: if those do not do, fewer need not be tried.
@@ -253,13 +256,12 @@ impl<'a> Prospect<'a> {
                 None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
                 None => {}
                 Some(tried) => {
-                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| cost(way) < below);
-                    let mut near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(|way| (cost(&way), exactly(way)));
-                    let enough = near.find(|(_, sampling)| sampling.expected.total_dn() <= tolerance_dn);
-                    let found = enough.unwrap_or((cost(&most), tried));
-                    if found.0 < below {
-                        cheapest = Some(found);
-                    }
+                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0) < below);
+                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(|way| (cost(&way), exactly(way)));
+                    let enough = near.filter(|(_, sampling)| sampling.expected.total_dn() <= tolerance_dn);
+                    let priced = enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, way.expected.total_dn()), way));
+                    let found = priced.filter(|(price, _)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
+                    cheapest = found.or(cheapest);
                 }
             }
         }
