@@ -7,7 +7,7 @@ use std::sync::Arc;
 use camsim::{
     core::{
         mount::CameraPath,
-        scenario::{LensSpec, ShutterSpec},
+        scenario::{LensSpec, ShutterSpec, Silhouettes},
         sequence::Sequence,
     },
     io::{
@@ -62,7 +62,7 @@ impl Without {
             Self::Blur => camera.shutter.exposure_ms = 0.0,
             Self::RollingShutter => camera.shutter.readout_ms = 0.0,
             Self::Time | Self::Anything => camera.shutter = ShutterSpec::default(),
-            Self::SilhouetteSamples => sequence.scenario.quality.max_error_dn = 16.0,
+            Self::SilhouetteSamples => sequence.scenario.quality.silhouettes = Silhouettes::Plain,
             Self::Nothing | Self::Photometric | Self::Lens => {}
         }
         if matches!(self, Self::Lens | Self::Anything) {

@@ -35,7 +35,8 @@ fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let marked = (word >> 31u) != 0u;
     let ray = lens_ray(pixel);
     use_key_of_line(pixel);
-    if (marked || (HAS_PARALLAX && !sees_one_surface(pixel, ray))) {
+    // Without samples the list is for depth and coordinates alone.
+    if (frame.edge_samples > 0u && (marked || (HAS_PARALLAX && !sees_one_surface(pixel, ray)))) {
         let color = rays_color(pixel, ray);
         emit(pixel, output_color(photometric(pixel, after_gather(ray, color), vignette_weight(pixel))));
     }

@@ -13,13 +13,14 @@ use crate::{
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
-    scenario::{Channel, Preset},
+    scenario::{Auto, Channel, Preset, Silhouettes},
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
     temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
 mod bounds;
+mod contours;
 mod describe;
 mod dry_run;
 mod edges;
@@ -41,6 +42,7 @@ mod surfaces;
 mod transfer;
 
 pub use bounds::LensReach;
+pub use contours::Contours;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
@@ -285,6 +287,19 @@ impl Planner {
             motion: *motion,
         };
         let mut motion = measure(&ideal);
+        let reason_for_none = self.outline.reason_for_none(scene, &key_pose, ideal.tangents(), motion.travel_m);
+        let silhouettes_in_view = reason_for_none.is_none();
+        let may_leave_plain = match quality.silhouettes {
+            Silhouettes::Auto => quality.key_frames == Auto::Auto && quality.max_error_dn < edges::IGNORED_DN,
+            Silhouettes::Plain => true,
+            Silhouettes::Rays => false,
+        };
+        let outlook = (silhouettes_in_view && may_leave_plain && !is_paper).then(|| {
+            let gain = &levels::gain(&self.sequence, &reach.camera);
+            let (surfaces, shutter) = (&self.surfaces, &self.shutter);
+            contours::Search { reach: &reach, surfaces, path, shutter, stamp_s, key_pose: &key_pose, gain }.outlook()
+        });
+        let mut plain = None;
         let sampling = if is_paper {
             levels::Sampling::of_paper()
         } else {
@@ -292,8 +307,24 @@ impl Planner {
             let fits = |scale: f64| f64::from(side_px) * scale / least_scale < f64::from(self.max_side_px);
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale);
-            prospect.choose(quality, least_scale, ideal_share, exposed(&motion, &ideal).path(quality, &mut Vec::new()), fits)
+            let exposure = exposed(&motion, &ideal).path(quality, &mut Vec::new());
+            let max_error_dn = quality.max_error_dn;
+            let choose = |tolerance_dn: &dyn Fn(f64) -> Option<f64>| {
+                prospect.choose(quality, tolerance_dn, least_scale, ideal_share, exposure, fits)
+            };
+            let beside_rays = choose(&|_| Some(max_error_dn));
+            plain = outlook.and_then(|outlook| {
+                let found = choose(&|scale| outlook.at_scale(scale).leaves_dn(max_error_dn));
+                let is_cheaper =
+                    found.within.is_some_and(|price| beside_rays.within.is_none_or(|other| price < other + outlook.price_of_rays()));
+                match quality.silhouettes {
+                    Silhouettes::Plain if found.within.is_none() => Some((outlook, beside_rays.sampling)),
+                    _ => (is_cheaper || quality.silhouettes == Silhouettes::Plain).then_some((outlook, found.sampling)),
+                }
+            });
+            plain.map_or(beside_rays.sampling, |(_, sampling)| sampling)
         };
+        let plain = plain.map(|(outlook, _)| outlook.at_scale(sampling.scale));
         if sampling.scale != least_scale && !is_paper {
             ideal = geometry(&one_key, sampling.scale, displaced);
             motion = measure(&ideal);
@@ -311,9 +342,20 @@ impl Planner {
             let exposed = exposed(&motion, &ideal);
             let exposure = exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
             let staged = |exposure| sampling.blur_stage(exposure, quality, motion.blur_px);
-            let (blur, travel_m) = (exposure.map(staged), motion.travel_m);
-            let edges = edges::edge_stage(&self.outline, scene, &key_pose, &ideal, travel_m, blur, quality, self.max_side_px, &mut skipped);
-            let has_rays = edges != EdgeStage::None && demanded != Some(TemporalStage::Linear);
+            let case = edges::EdgeCase {
+                outline: &self.outline,
+                pose: &key_pose,
+                ideal: &ideal,
+                travel_m: motion.travel_m,
+                blur: exposure.map(staged),
+                quality,
+                max_side_px: self.max_side_px,
+                reason_for_none: reason_for_none.as_deref(),
+                plain: plain.as_ref(),
+                truth: self.truth,
+            };
+            let edges = edges::edge_stage(&case, &mut skipped);
+            let has_rays = edges.has_rays() && demanded != Some(TemporalStage::Linear);
             let with_poses = |exposure| if has_rays { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
             (exposure.map(with_poses).map(staged), edges)
         };
@@ -332,10 +374,12 @@ impl Planner {
             blur,
             straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
-            levels_in_the_way: levels::in_the_way(quality, &sampling, expected),
+            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, plain.as_ref()),
+            plain,
+            silhouettes_in_view,
             surfaces: &self.surfaces,
         };
-        let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion, edges);
+        let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion);
         let error::Way { temporal, blur } = way;
         let displaced = Some((temporal, key_twist));
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
@@ -343,7 +387,7 @@ impl Planner {
             ideal = geometry(&one_key, sampling.scale, displaced);
         }
         motion::note_skips(&motion, temporal, &mut skipped);
-        let looks_behind = edges != EdgeStage::None && matches!(temporal, TemporalStage::Reproject { .. });
+        let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
         predicted.holes_of_one = looks_behind.then(|| truths.holes(&one_key, quality.max_error_px));
         let wanted = keys::wanted(predicted.holes_of_one.as_ref(), temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {

@@ -199,6 +199,9 @@ pub struct QualitySpec {
     pub ideal_scale: Auto<f64>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
+    /// Colours of pixels at silhouettes.
+    #[serde(default)]
+    pub silhouettes: Silhouettes,
 }
 
 impl Default for QualitySpec {
@@ -214,6 +217,7 @@ impl Default for QualitySpec {
             footprint_taps: Auto::Auto,
             ideal_scale: Auto::Auto,
             key_frames: Auto::Auto,
+            silhouettes: Silhouettes::Auto,
         }
     }
 }
@@ -229,6 +233,19 @@ pub enum Preset {
     /// (eq. 18), one ideal frame and one sample a pixel; `blur_samples` counts the samples of an exposure (100), and the tolerances choose
     /// nothing but the terrain's level of detail.
     Paper,
+}
+
+/// How pixels at silhouettes get their colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Silhouettes {
+    /// As `plain` where that is expected to keep `max_error_dn`, otherwise as `rays`.
+    #[default]
+    Auto,
+    /// As everywhere: from pixels of the ideal frame, each of which shows one surface.
+    Plain,
+    /// By rays of their own, over the pixel's area and exposure, through ideal frames that keep several samples a pixel.
+    Rays,
 }
 
 /// Temporal inverse methods.

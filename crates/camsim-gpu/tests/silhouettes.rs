@@ -5,7 +5,7 @@ mod common;
 use camsim_core::{
     plan::EdgeStage,
     reference::Oracle,
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes},
     scene::{Scene, Terrain},
     temporal::{
         edges::{KeyView, Keys, gather_edges},
@@ -28,16 +28,17 @@ const TURN: DVec3 = DVec3::new(0.2, -0.3, 0.5);
 /// Compares with 36 and with 4 samples a pixel, and prints what one would give. PSNR against full scale 1.
 fn check(name: &str, scenario: &Scenario, trajectory: &Trajectory, scene: &Scene, [at_least_db, four_at_least_db]: [f64; 2]) {
     let engine = engine();
-    let made = |max_error_dn: f64| {
+    let made = |max_error_dn: f64, silhouettes: Silhouettes| {
         let mut scenario = scenario.clone();
         scenario.quality.max_error_dn = max_error_dn;
+        scenario.quality.silhouettes = silhouettes;
         let sequence = sequence(scenario, trajectory.clone(), scene.clone());
         (render(&engine, &sequence, &[Channel::Color], 0), sequence)
     };
-    let (done, sequence) = made(0.5);
+    let (done, sequence) = made(0.5, Silhouettes::Rays);
     let expected = expected(&sequence, &done.plan);
     let psnr = |done: &Finished| linear_psnr(&done.frame, &expected);
-    let (found, four, one) = (psnr(&done), psnr(&made(8.0).0), psnr(&made(20.0).0));
+    let (found, four, one) = (psnr(&done), psnr(&made(8.0, Silhouettes::Rays).0), psnr(&made(8.0, Silhouettes::Plain).0));
     let edges = done.plan.edges;
     eprintln!(
         "{name}: {found:.1} dB over {} pixels at silhouettes ({edges:?}); 4 samples a pixel {four:.1} dB, 1 sample {one:.1} dB",
@@ -193,6 +194,7 @@ fn samples_are_drawn_of_triangles_near_silhouettes_alone() {
     scenario.camera.size_px = [640, 480];
     scenario.camera.focal_px = [512.0, 512.0];
     scenario.camera.mount.angles_deg = [4.0, -35.0, 0.0];
+    scenario.quality.silhouettes = Silhouettes::Rays;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
     let engine = engine();
     let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
@@ -215,6 +217,7 @@ fn marks_are_their_twins() {
     let mut scenario = camera();
     scenario.camera.size_px = [313, 241];
     scenario.camera.mount.angles_deg = [4.0, -35.0, 0.0];
+    scenario.quality.silhouettes = Silhouettes::Rays;
     let sequence = sequence(scenario, steady(110.0, 0.0, DVec3::ZERO, DVec3::ZERO), ridges());
     let engine = engine();
     let mut session = engine.session::<std::convert::Infallible>(sequence, &[Channel::Color]).expect("session");
@@ -241,6 +244,34 @@ fn a_surface_that_fills_the_view_is_not_supersampled() {
     let done = render(&engine(), &sequence, &[Channel::Color], 0);
     assert_eq!(done.plan.edges, EdgeStage::None);
     assert!(done.plan.skipped.iter().any(|skip| skip.what == "silhouette supersampling"));
+}
+
+/// Where colours at silhouettes are left as they are depth and coordinates are not, and asking for these changes no colour.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn colours_do_not_depend_on_whether_truth_is_wanted() {
+    let mut scenario = camera();
+    scenario.camera.shutter = rolling(8.0);
+    scenario.quality.silhouettes = Silhouettes::Plain;
+    let sequence = sequence(scenario, steady(120.0, 0.0, EAST, TURN), black_ground_and_roof());
+    let engine = engine();
+    let plain = render(&engine, &sequence, &[Channel::Color], 0);
+    let both = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
+    assert_eq!(plain.plan.edges, EdgeStage::None);
+    assert!(matches!(both.plan.edges, EdgeStage::Supersampled { samples: 0, .. }) && both.plan.looks_for_itself());
+    assert_eq!((plain.plan.keys.len(), plain.plan.temporal), (both.plan.keys.len(), both.plan.temporal));
+    assert!(plain.frame.color_rgba == both.frame.color_rgba, "depth changed colours");
+    // What each pixel's own ray meets at mid-exposure, pixel by pixel.
+    let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+    let view = oracle.view(0);
+    let depth_m = both.frame.depth_m.as_ref().expect("depth");
+    let [width, height] = both.frame.size_px;
+    let differs = |&(x, y): &(u32, u32)| {
+        let expected_m = view.look([x, y], DVec2::ZERO, 0.0).and_then(|look| look.hit).map_or(f64::INFINITY, |hit| hit.depth_m);
+        (f64::from(depth_m[(y * width + x) as usize]) / expected_m - 1.0).abs() > 1e-4
+    };
+    let wrong = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(differs).count();
+    assert_eq!(wrong, 0, "pixels with the depth of another surface");
 }
 
 #[test]

@@ -5,8 +5,8 @@
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, Planner},
-    scenario::{Auto, Channel, QualitySpec},
+    plan::{EdgeStage, FramePlan, Planner},
+    scenario::{Auto, Channel, QualitySpec, Silhouettes},
     sequence::Sequence,
 };
 use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
@@ -86,4 +86,56 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
     }
     // Of all cases a tenth may be outside: distant ground at grazing angles beyond houses, and a lens's fold, are seen by few of the 32 places.
     assert!(outside.len() * 10 <= if long { 3 * cases().map_or(0, |all| all.len()) } else { 0 }, "{outside:#?}");
+}
+
+/// What silhouettes cost that are left as the ideal frame's pixels show them, away from and at them.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn silhouettes_left_as_they_are_cost_what_is_predicted() {
+    let long = std::env::var_os("CAMSIM_LONG").is_some();
+    let engine = Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+    let rms_dn = |psnr_db: f64| 255.0 * 10_f64.powf(-psnr_db / 20.0);
+    for case in cases().expect("cases").iter().filter(|case| case.name == "buildings-15" || long && case.name == "vibration-200") {
+        let truth = Truth::new(&case.sequence).expect("a truth");
+        let with = |silhouettes: Silhouettes, ideal_scale: Auto<f64>| {
+            let mut sequence = (*case.sequence).clone();
+            sequence.scenario.quality = QualitySpec { silhouettes, ideal_scale, ..QualitySpec::default() };
+            let sequence = Arc::new(sequence);
+            let mut found = None;
+            let measure = &mut |done: Finished| {
+                let errors = truth.picture_errors(&done.frame);
+                found =
+                    Some((errors.psnr_db.map(rms_dn).expect("pixels"), errors.smooth_dn.expect("pixels away from silhouettes"), done.plan));
+                Ok(())
+            };
+            engine
+                .session::<Infallible>(sequence, &[Channel::Color])
+                .expect("a session")
+                .render::<Infallible>([FRAME], measure)
+                .expect("rendered");
+            found.expect("a frame")
+        };
+        for scale in [1.0, 1.6] {
+            let (all_dn, smooth_dn, plan) = with(Silhouettes::Plain, Auto::Value(scale));
+            let predicted = plan.predicted.plain_silhouettes.expect("silhouettes in view");
+            assert_eq!(plan.edges, EdgeStage::None);
+            let measured_dn = (all_dn * all_dn - smooth_dn * smooth_dn).max(0.0).sqrt();
+            let ratio = measured_dn / predicted.error_dn;
+            eprintln!(
+                "{} at {scale}: all {all_dn:.3}, without silhouettes {smooth_dn:.3}, so by them {measured_dn:.3}; {predicted:.3?}, ratio {ratio:.2}",
+                case.name
+            );
+            assert!((BELOW..ABOVE).contains(&ratio), "{} at {scale}: {measured_dn:.3} for {:.3}", case.name, predicted.error_dn);
+        }
+        let (all_dn, _, plan) = with(Silhouettes::Auto, Auto::Auto);
+        let (rays_dn, _, with_rays) = with(Silhouettes::Rays, Auto::Auto);
+        eprintln!("{}: {all_dn:.3} as planned, {rays_dn:.3} with rays", case.name);
+        assert!(plan.predicted.plain_silhouettes.is_some() && plan.predicted.levels_kept && all_dn < ABOVE);
+        assert!(with_rays.edges.has_rays() && all_dn < rays_dn, "worse than rays: {all_dn} {rays_dn}");
+        // Too little for the stairs even of the finest ideal frame.
+        let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0));
+        assert!(
+            !forced.predicted.levels_kept && forced.predicted.levels_in_the_way.is_some_and(|cause| cause.contains("quality.silhouettes"))
+        );
+    }
 }

@@ -137,7 +137,7 @@ impl FramePlan {
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
         passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}) -> photometric{truth}"));
-        if let EdgeStage::Supersampled { samples, .. } = self.edges {
+        if let EdgeStage::Supersampled { samples: samples @ 1.., .. } = self.edges {
             passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
         }
         passes.push("readback".to_owned());
@@ -213,9 +213,11 @@ impl Predicted {
             let share = 100.0 * share;
             writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
+        let plain =
+            self.plain_silhouettes.map_or_else(String::new, |plain| format!(", {:.2} by silhouettes left as they are", plain.error_dn));
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples: {}",
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{plain}: {}",
             if self.levels_kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" }
         )?;
         match &self.levels_in_the_way {

@@ -5,6 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::{
     TemporalStage,
+    contours::LINES,
     probes::Probe,
     surfaces::{Met, Surfaces},
 };
@@ -21,8 +22,6 @@ use crate::{
 pub(super) const MAX_LOOK_UPS: usize = 8;
 /// Relative difference of depth beyond which something else stands before a point.
 const HIDDEN: f64 = 1e-3;
-/// Lines of three through three by three places, the border's first.
-const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
 /// A frame to be tried.
 #[derive(Clone, Copy)]

@@ -7,10 +7,10 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BlurStage, FramePlan, SIZE_QUANTUM_PX, Skip};
+use super::{BlurStage, Contours, FramePlan, SIZE_QUANTUM_PX, Skip};
 use crate::{
     pose::CameraPose,
-    scenario::QualitySpec,
+    scenario::{QualitySpec, Silhouettes},
     scene::{Aabb, Mesh, Scene, Terrain, terrain::Frustum},
 };
 
@@ -19,7 +19,7 @@ const BLOCK_CELLS: u32 = 8;
 /// A slope this close to the view's own already counts as edge-on.
 const FACING_MARGIN: f64 = 0.95;
 /// From this tolerance (1/255 RMS) on silhouettes are left as one sample a pixel shows them.
-const IGNORED_DN: f64 = 16.0;
+pub(super) const IGNORED_DN: f64 = 16.0;
 /// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4
 /// samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is
 /// 0.5/255 over the picture.
@@ -42,7 +42,7 @@ pub enum EdgeStage {
     Supersampled {
         /// Fine pixels along a side of an ideal pixel, each with 4 samples.
         scale: u32,
-        /// Rays over the area and exposure of an output pixel.
+        /// Rays over the area and exposure of an output pixel; 0 where silhouettes are known for depth and coordinates alone.
         samples: u32,
         /// Whether something thinner than a pixel may be in view: silhouettes are then looked for among all samples, otherwise between the
         /// middles of pixels, and only what is near them is drawn with samples.
@@ -121,7 +121,7 @@ impl SceneOutline {
     }
 
     /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents` (u_min, u_max, v_min, v_max).
-    fn reason_for_none(&self, scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> Option<String> {
+    pub(super) fn reason_for_none(&self, scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> Option<String> {
         let frustum = Frustum::new(pose, tangents);
         let terrain = self.chunks.iter().any(|patch| frustum.may_see(&patch.bounds));
         let mut meshes = self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| frustum.may_see(&outline.bounds));
@@ -142,25 +142,48 @@ impl SceneOutline {
     }
 }
 
+impl EdgeStage {
+    /// Whether the colours of pixels at silhouettes come from rays of their own.
+    #[must_use]
+    pub fn has_rays(self) -> bool {
+        matches!(self, Self::Supersampled { samples: 1.., .. })
+    }
+}
+
+/// What of a frame the edge stage depends on.
+pub(super) struct EdgeCase<'a> {
+    pub outline: &'a SceneOutline,
+    pub pose: &'a CameraPose,
+    pub ideal: &'a crate::temporal::IdealGeometry,
+    pub travel_m: f64,
+    pub blur: Option<BlurStage>,
+    pub quality: &'a QualitySpec,
+    pub max_side_px: u32,
+    /// Why no silhouette can be in view, if none can.
+    pub reason_for_none: Option<&'a str>,
+    /// What silhouettes cost that are left as they are, if they are to be.
+    pub plain: Option<&'a Contours>,
+    /// Whether depth and coordinates are wanted.
+    pub truth: bool,
+}
+
 /// The edge stage of a frame.
-pub(super) fn edge_stage(
-    outline: &SceneOutline,
-    scene: &Scene,
-    pose: &CameraPose,
-    ideal: &crate::temporal::IdealGeometry,
-    travel_m: f64,
-    blur: Option<BlurStage>,
-    quality: &QualitySpec,
-    max_side_px: u32,
-    skipped: &mut Vec<Skip>,
-) -> EdgeStage {
-    if let Some(reason) = outline.reason_for_none(scene, pose, ideal.tangents(), travel_m) {
-        skipped.push(Skip { what: "silhouette supersampling", reason });
+pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeStage {
+    let EdgeCase { outline, pose, ideal, blur, quality, max_side_px, plain, truth, .. } = *case;
+    let mut skip = |what, reason: String| skipped.push(Skip { what, reason });
+    if let Some(reason) = case.reason_for_none {
+        skip("silhouette supersampling", reason.to_owned());
         return EdgeStage::None;
     }
-    if quality.max_error_dn >= IGNORED_DN {
-        skipped.push(Skip { what: "silhouette supersampling", reason: format!("quality.max_error_dn is {IGNORED_DN} or more") });
+    if quality.silhouettes == Silhouettes::Auto && quality.max_error_dn >= IGNORED_DN {
+        skip("silhouette supersampling", format!("quality.max_error_dn is {IGNORED_DN} or more"));
         return EdgeStage::None;
+    }
+    if let Some(Contours { at_dn, error_dn, .. }) = plain {
+        let what = if truth { "rays for the colours of silhouettes" } else { "silhouette supersampling" };
+        skip(what, format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"));
+        let thin = || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
+        return if truth { EdgeStage::Supersampled { scale: 1, samples: 0, thin: thin() } } else { EdgeStage::None };
     }
     let [width, height] = ideal.size_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
     let fits = |scale: u64| {
@@ -171,7 +194,7 @@ pub(super) fn edge_stage(
         true => [3, 2].into_iter().find(|&scale| fits(u64::from(scale))).unwrap_or(1),
     };
     // Ground is not thin. What is drawn in colour keeps its order of drawing.
-    let thin = scale > 1 || outline.meshes_in_view(pose, ideal.tangents(), travel_m);
+    let thin = scale > 1 || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
     EdgeStage::Supersampled { scale, samples: samples(scale, blur), thin }
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    BlurStage, EdgeStage, Holes, KeyFrame, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
+    BlurStage, Contours, Holes, KeyFrame, LensReach, Motion, NodeDepths, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     exposure::{MOST_STEPS, miss_px},
     levels::Expected,
@@ -73,7 +73,9 @@ pub struct Predicted {
     pub resampling_dn: f64,
     /// The same of too few samples over the exposure.
     pub blur_dn: f64,
-    /// Whether the two are within `quality.max_error_dn`.
+    /// What silhouettes cost that are left as the ideal frame's pixels show them; `None` where none is, or none can be in view.
+    pub plain_silhouettes: Option<Contours>,
+    /// Whether all three are within `quality.max_error_dn`.
     pub levels_kept: bool,
     /// If not: what is in the way.
     pub levels_in_the_way: Option<String>,
@@ -112,6 +114,9 @@ pub(super) struct Case<'a> {
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
+    /// Cost of silhouettes that are left as they are.
+    pub plain: Option<Contours>,
+    pub silhouettes_in_view: bool,
     pub surfaces: &'a Surfaces,
 }
 
@@ -131,7 +136,7 @@ pub(super) struct Way {
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
-pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, motion: &Motion, edges: EdgeStage) -> Choice<'a> {
+pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, motion: &Motion) -> Choice<'a> {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
@@ -145,13 +150,13 @@ pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, mo
     }
     let forecast = truths.forecast(detail.as_ref());
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
-    let may_skip_depth = edges == EdgeStage::None || motion.parallax_px <= BOUND_SHARE * tolerance_px;
+    let may_skip_depth = !case.silhouettes_in_view || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match demanded {
         Some(temporal) => Way { temporal, blur: case.blur },
-        None => forecast.choose(tolerance_px, case.ways(motion, edges, may_skip_depth)),
+        None => forecast.choose(tolerance_px, case.ways(motion, may_skip_depth)),
     };
     let mut predicted = forecast.predict(case, way);
-    if edges != EdgeStage::None {
+    if case.silhouettes_in_view {
         predicted.silhouette_share = truths.silhouette_share();
     }
     Choice { way, terrain_error_px, predicted, truths }
@@ -160,14 +165,14 @@ pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, mo
 impl Case<'_> {
     /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the depth beside where they look: not
     /// for silhouettes.
-    fn ways(&self, motion: &Motion, edges: EdgeStage, may_skip_depth: bool) -> Vec<Way> {
+    fn ways(&self, motion: &Motion, may_skip_depth: bool) -> Vec<Way> {
         let quality = &self.sequence.scenario.quality;
         let with = |temporal| Way { temporal, blur: self.blur };
         let mut ways = Vec::new();
         if may_skip_depth {
             ways.extend([TemporalStage::Identity, TemporalStage::Rotation].map(with));
         }
-        if quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && edges == EdgeStage::None {
+        if quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view {
             ways.push(Way { temporal: TemporalStage::Linear, blur: self.straight_blur });
             if motion.rotation_rad < CHEAP_RK2_STEPS * RK2_STEP_DEG.to_radians() {
                 ways.push(with(TemporalStage::Rk2));
@@ -376,6 +381,7 @@ impl Forecast<'_> {
             format_px,
             resampling_dn,
             blur_dn,
+            plain_silhouettes: case.plain,
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,

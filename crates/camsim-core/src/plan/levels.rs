@@ -11,14 +11,15 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, LensReach, SurfaceReads,
+    BlurStage, Contours, LensReach, SurfaceReads,
     exposure::ExposurePath,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
-    surfaces::{Met, Surfaces},
+    surfaces::{FOG_AT_VISIBILITY, Met, Surfaces},
     transfer::{Path, SurfaceFilter, error2},
 };
 use crate::{
+    camera::CameraModel,
     mount::CameraPath,
     photometric::vignette_weight,
     pose::CameraPose,
@@ -41,6 +42,8 @@ const FORMAT_DN: f64 = 0.12;
 const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, 2.0];
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// What is left of a tolerance and what is taken of it may add up to a little more.
+const ROUNDED: f64 = 1.0 + 1e-9;
 /// Most samples on one polynomial of the path.
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
@@ -51,8 +54,6 @@ const IDEAL_COSTS: [f64; 3] = [8.0, 10.5, 15.0];
 const SPLINE_COST: f64 = 7.0;
 /// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.
 const WORTH: f64 = 0.2;
-/// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
-const FOG_AT_VISIBILITY: f64 = 3.912;
 
 /// What is expected of one way of sampling, RMS over the picture, 1/255 of the linear range.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,6 +77,14 @@ pub(super) struct Sampling {
     pub taps: TapStage,
     pub samples_per_px: f64,
     pub expected: Expected,
+}
+
+/// What was chosen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Choice {
+    pub sampling: Sampling,
+    /// Its price, bilinear reads of an output pixel; `None` where it is not within the tolerance.
+    pub within: Option<f64>,
 }
 
 /// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
@@ -116,12 +125,7 @@ impl<'a> Prospect<'a> {
         key_pose: &CameraPose,
     ) -> Self {
         let (probes, focal_px) = (&reach.probes, reach.camera.focal_px);
-        let photometric = &sequence.scenario.camera.photometric;
-        let weight = |[x, y]: [u32; 2]| {
-            let Some(map) = &sequence.vignette else { return 1.0 };
-            let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / reach.camera.size_px[k]) as usize);
-            f64::from(vignette_weight(map.values[row * map.size_px[0] as usize + column], photometric.vignette_thresholds))
-        };
+        let gain = gain(sequence, &reach.camera);
         // Evenly over how wide pixels are: the few that are much wider than the rest may be most of the error.
         let width = |probe: &Probe| {
             let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
@@ -146,7 +150,7 @@ impl<'a> Prospect<'a> {
                 sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
             Some(Sight {
                 spectrum: grain.of(shown.surface)?,
-                gain: weight(probe.pixel) * photometric.light * clear,
+                gain: gain(probe.pixel) * clear,
                 key_px: shown.key_px,
                 key_from_camera: shown.key_from_camera,
                 camera_from_px: DMat2::from_diagonal(focal_px) * probe.uv_from_px,
@@ -197,20 +201,20 @@ impl<'a> Prospect<'a> {
         sums.map(|sum| sum / (part * self.counted as f64).max(1.0))
     }
 
-    /// The cheapest sampling within the tolerance, or the best there is. The scale is not below `least_scale`, and that at which the
-    /// frame does not fit is left out. `ideal_share`: pixels that the ideal frame has at scale 1 for each of the camera's.
+    /// The cheapest sampling within the tolerance (1/255, of an ideal frame of a scale; `None` is none), or the best there is. The scale is
+    /// not below `least_scale`, and that at which the frame does not fit is left out. `ideal_share`: pixels that the ideal frame has at scale 1 for each of the camera's.
     pub fn choose(
         &self,
         quality: &QualitySpec,
+        tolerance_dn: impl Fn(f64) -> Option<f64>,
         least_scale: f64,
         ideal_share: f64,
         exposure: Option<ExposurePath>,
         fits: impl Fn(f64) -> bool,
-    ) -> Sampling {
+    ) -> Choice {
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && fits(scale));
         let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
-        let tolerance_dn = quality.max_error_dn;
         let per_px = |scale: f64| match quality.blur_samples.value() {
             Some(samples) => vec![f64::from(samples)],
             None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
@@ -222,7 +226,6 @@ impl<'a> Prospect<'a> {
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
         let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share);
-        let price = |cost: f64, total_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / tolerance_dn));
         // Each with the fewest samples first: it may not be cheaper than that, and without any error.
         let fewest = |sampling: &Sampling| way(*sampling, choices(sampling.scale).first().copied().unwrap_or(0.0));
         let mut ways: Vec<(f64, Sampling)> = scales
@@ -232,6 +235,7 @@ impl<'a> Prospect<'a> {
             .map(|sampling| (cost(&fewest(&sampling)), sampling))
             .collect();
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let price = |cost: f64, total_dn: f64, tolerance_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / tolerance_dn));
         // A few places tell what is far from keeping the tolerance.
         let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, &sampling, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
@@ -242,9 +246,10 @@ impl<'a> Prospect<'a> {
         let mut cheapest: Option<(f64, Sampling)> = None;
         for (least_cost, sampling) in ways {
             let below = cheapest.map_or(f64::INFINITY, |(price, _)| price);
-            if price(least_cost, 0.0) >= below {
+            if price(least_cost, 0.0, 1.0) >= below {
                 break;
             }
+            let Some(tolerance_dn) = tolerance_dn(sampling.scale) else { continue };
             // The most samples first: if those do not do, fewer need not be tried.
             let choices = choices(sampling.scale);
             let Some((&last, fewer)) = choices.split_last() else { continue };
@@ -256,17 +261,21 @@ impl<'a> Prospect<'a> {
                 None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
                 None => {}
                 Some(tried) => {
-                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0) < below);
+                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0, 1.0) < below);
                     let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(|way| (cost(&way), exactly(way)));
                     let enough = near.filter(|(_, sampling)| sampling.expected.total_dn() <= tolerance_dn);
-                    let priced = enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, way.expected.total_dn()), way));
+                    let priced =
+                        enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, way.expected.total_dn(), tolerance_dn), way));
                     let found = priced.filter(|(price, _)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }
             }
         }
+        if let Some((price, sampling)) = cheapest {
+            return Choice { sampling, within: Some(price) };
+        }
         let none = Sampling { samples_per_px: 2.0, ..Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline) };
-        cheapest.map_or_else(|| best.map_or(none, |(_, way)| exactly(way)), |(_, sampling)| sampling)
+        Choice { sampling: best.map_or(none, |(_, way)| exactly(way)), within: None }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -291,6 +300,19 @@ impl<'a> Prospect<'a> {
         };
         let reads = self.sights.iter().map(of).sum::<f64>() / self.sights.len().max(1) as f64;
         ideal_share * scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
+    }
+}
+
+/// Of the linear range, for each unit of light that arrives at a pixel.
+pub(super) fn gain(sequence: &Sequence, camera: &CameraModel) -> impl Fn([u32; 2]) -> f64 + Sync {
+    let photometric = &sequence.scenario.camera.photometric;
+    let size_px = camera.size_px;
+    move |[x, y]: [u32; 2]| {
+        let vignette = sequence.vignette.as_ref().map_or(1.0, |map| {
+            let [column, row] = [(x, 0), (y, 1)].map(|(at, k)| (at * map.size_px[k] / size_px[k]) as usize);
+            f64::from(vignette_weight(map.values[row * map.size_px[0] as usize + column], photometric.vignette_thresholds))
+        });
+        vignette * photometric.light
     }
 }
 
@@ -342,7 +364,7 @@ impl Shown {
 }
 
 /// Path of the source over the exposure, camera px: from end to end, and its length.
-fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_depth: f64, focal_px: DVec2) -> (DVec2, f64) {
+pub(super) fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_depth: f64, focal_px: DVec2) -> (DVec2, f64) {
     const STRETCHES: u32 = 8;
     if exposure_s <= 0.0 {
         return (DVec2::ZERO, 0.0);
@@ -362,9 +384,13 @@ fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_de
 }
 
 /// Why the tolerance is not kept; `None` if it is.
-pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected) -> Option<String> {
-    if quality.preset == Preset::Paper || expected.total_dn() <= quality.max_error_dn {
+pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected, plain: Option<&Contours>) -> Option<String> {
+    let plain_dn = plain.map_or(0.0, |plain| plain.error_dn);
+    if quality.preset == Preset::Paper || expected.total_dn().hypot(plain_dn) <= ROUNDED * quality.max_error_dn {
         return None;
+    }
+    if plain_dn > expected.total_dn() {
+        return Some(format!("quality.silhouettes: {plain_dn:.2}/255 where they are left as they are"));
     }
     let Expected { resampling_dn, blur_dn } = expected;
     Some(match (blur_dn > resampling_dn, quality.blur_samples, quality.footprint_taps, quality.ideal_scale) {

@@ -7,8 +7,11 @@ use glam::{DVec2, DVec3};
 use super::NEAR_M;
 use crate::{
     pose::CameraPose,
-    scene::{Aabb, Mesh, Scene, Terrain, TerrainHit, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
+    scene::{Aabb, Encoding, Mesh, Scene, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
 };
+
+/// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
+pub(super) const FOG_AT_VISIBILITY: f64 = 3.912;
 
 /// The surfaces of a scene, prepared for rays.
 #[derive(Debug)]
@@ -17,6 +20,8 @@ pub(super) struct Surfaces {
     /// Mesh and place of the first corner in its indices.
     triangles: Vec<(u32, u32)>,
     tree: BoxTree,
+    /// Linear light of each byte of a picture, by [`Encoding`].
+    linear: [(Encoding, [f32; 256]); 2],
 }
 
 /// Where a ray first meets something.
@@ -42,7 +47,8 @@ impl Surfaces {
             bounds
         };
         let tree = BoxTree::new(&triangles.iter().map(bounds).collect::<Vec<_>>());
-        Self { scene, triangles, tree }
+        let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
+        Self { scene, triangles, tree, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
@@ -69,9 +75,32 @@ impl Surfaces {
 
     /// Place in the picture on what a ray met, texels.
     pub fn texel(&self, met: &Met) -> DVec2 {
-        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &mesh.texture);
-        let texture = of_mesh.or(self.terrain().map(|terrain| &terrain.texture));
+        let texture = self.texture(met);
         texture.map_or(DVec2::ZERO, |texture| DVec2::from_array(met.uv) * DVec2::from_array(texture.size_px.map(f64::from)))
+    }
+
+    /// Linear light that arrives along a ray of `range_per_depth` metres for each metre of its depth: the nearest texel of what it met, or the
+    /// sky, and fog.
+    pub fn color(&self, met: Option<&Met>, range_per_depth: f64) -> DVec3 {
+        let sky = DVec3::from_array(self.scene.sky_linear.map(f64::from));
+        let Some((met, texture)) = met.and_then(|met| Some((met, self.texture(met)?))) else { return sky };
+        let [x, y] = [0, 1].map(|axis: usize| {
+            let side = f64::from(texture.size_px[axis]);
+            (met.uv[axis].rem_euclid(1.0) * side).min(side - 1.0) as usize
+        });
+        let first = 4 * (y * texture.size_px[0] as usize + x);
+        let table = self.linear.iter().find(|(encoding, _)| *encoding == texture.encoding).map_or(&self.linear[0].1, |(_, table)| table);
+        let light = |channel: usize| texture.rgba8.get(first + channel).map_or(0.0, |&byte| f64::from(table[usize::from(byte)]));
+        let clear = self
+            .scene
+            .fog_visibility_m
+            .map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * met.depth_m * range_per_depth / visibility_m).exp());
+        sky + clear * (DVec3::new(light(0), light(1), light(2)) - sky)
+    }
+
+    fn texture(&self, met: &Met) -> Option<&Texture> {
+        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &*mesh.texture);
+        of_mesh.or(self.terrain().map(|terrain| &*terrain.texture))
     }
 
     /// Lower bound of the planar depth of anything in view from within `travel_m` of `pose`, metres; infinite with nothing in view.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Solver, TrackerSpec};
+use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Silhouettes, Solver, TrackerSpec};
 use crate::plan::MAX_KEYS;
 
 /// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
@@ -255,6 +255,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     check.require(quality.ideal_scale == Auto::Auto, "quality.ideal_scale", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
+    check.require(quality.silhouettes != Silhouettes::Rays, "quality.silhouettes", || {
+        "are plain with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
     check.require(matches!(quality.footprint_taps, Auto::Auto | Auto::Value(1)), "quality.footprint_taps", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
@@ -359,6 +362,10 @@ mod tests {
             ("quality.iterations", |s| {
                 s.quality.preset = Preset::Paper;
                 s.quality.iterations = Auto::Value(2);
+            }),
+            ("quality.silhouettes", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.silhouettes = Silhouettes::Rays;
             }),
             ("quality.footprint_taps", |s| {
                 s.quality.preset = Preset::Paper;

@@ -130,6 +130,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.footprint_taps", CountOr(MAX_FOOTPRINT_TAPS, AUTO)),
     ("quality.ideal_scale", NumberOr(AUTO)),
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
+    ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),
     ("output.exr_pixel", Word(&["half", "float"])),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     mount::{CameraPath, MountError},
-    scenario::{LensSpec, ShutterSpec},
+    scenario::{LensSpec, ShutterSpec, Silhouettes},
     sequence::Sequence,
 };
 use camsim_gpu::Engine;
@@ -72,7 +72,7 @@ impl Effect {
             Self::RollingShutter => {
                 camera.shutter = ShutterSpec { exposure_ms: camera.shutter.exposure_ms, ..ShutterSpec::default() };
             }
-            Self::Silhouettes => sequence.scenario.quality.max_error_dn = 20.0,
+            Self::Silhouettes => sequence.scenario.quality.silhouettes = Silhouettes::Plain,
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use camsim_core::{
     plan::Planner,
-    scenario::{Auto, Channel, LensModel, Preset, Scenario, Solver},
+    scenario::{Auto, Channel, LensModel, Preset, Scenario, Silhouettes, Solver},
     sequence::Sequence,
 };
 
@@ -88,8 +88,13 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
             }
         }
         if matches!(case.group, Group::Buildings | Group::AllEffects) {
-            row("silhouettes: 1 sample", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 20.0);
-            row("silhouettes: 16 samples", Family::Silhouettes, &|scenario| scenario.quality.max_error_dn = 0.5);
+            let with = |silhouettes| move |scenario: &mut Scenario| scenario.quality.silhouettes = silhouettes;
+            row("silhouettes: plain", Family::Silhouettes, &with(Silhouettes::Plain));
+            row("silhouettes: 4 samples", Family::Silhouettes, &with(Silhouettes::Rays));
+            row("silhouettes: 36 samples", Family::Silhouettes, &|scenario| {
+                scenario.quality.max_error_dn = 0.5;
+                scenario.quality.silhouettes = Silhouettes::Rays;
+            });
         }
     }
     if matches!(case.group, Group::Exposure | Group::AllEffects)

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use camsim_core::scenario::{Auto, CameraSpec, Channel, Preset, ShutterSpec};
+use camsim_core::scenario::{Auto, CameraSpec, Channel, Preset, ShutterSpec, Silhouettes};
 use camsim_gpu::engine::Session;
 
 use super::{
@@ -20,8 +20,6 @@ const ROUNDS: usize = 9;
 const BURST: u64 = 3;
 /// No round begins after this.
 const BUDGET: Duration = Duration::from_secs(120);
-/// A tolerance at which silhouettes are left as one sample a pixel shows them, as the paper leaves them.
-const NO_SILHOUETTES_DN: f64 = 20.0;
 /// The reference program under a software adapter on two cores, 640 x 480, its best time in ms a frame; the last row's exposure is 100 ms.
 const CASES: [(&str, bool, f64, f64, u32, f64); 5] = [
     ("ideal camera, nothing on", false, 0.0, 0.0, 1, 23.6),
@@ -48,7 +46,7 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
             let mut sequence = (*rig::sequence(camera, Motion::turning(), &scene)?).clone();
             sequence.scenario.quality.preset = preset;
             if !silhouettes {
-                sequence.scenario.quality.max_error_dn = NO_SILHOUETTES_DN;
+                sequence.scenario.quality.silhouettes = Silhouettes::Plain;
             }
             if preset == Preset::Paper {
                 sequence.scenario.quality.blur_samples = Auto::Value(samples);
