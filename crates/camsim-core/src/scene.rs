@@ -10,8 +10,8 @@ pub mod texture;
 
 pub use mesh::{Mesh, MeshVertex, Wrap};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, LodSelection, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainHit, TerrainMesh, TerrainVertex,
-    VERTEX_BITS,
+    Aabb, CHUNK_CELLS, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid, TerrainHit, TerrainMesh,
+    TerrainVertex, VERTEX_BITS,
 };
 pub use texture::{Encoding, MipLevel, Texture, linear_from_srgb, srgb_from_linear};
 

@@ -41,7 +41,7 @@ mod slot;
 
 use ahead::{Ahead, Prepared, Preparer};
 pub use error::RenderError;
-use error::RenderErrorBase;
+pub(crate) use error::RenderErrorBase;
 pub use inspect::IdealImages;
 use readback::{Output, coords, look_for_unknown, read_mapped};
 use slot::{Slot, Target, list_buffer, pose_buffer};
@@ -357,7 +357,7 @@ impl Session<'_> {
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), ComposeError> {
+    fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), RenderErrorBase> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
@@ -387,7 +387,7 @@ impl Session<'_> {
         let sequence = self.planner.sequence();
         let ideal_slots = &mut self.slots[slot].ideal;
         while ideal_slots.len() < poses.len() {
-            ideal_slots.push(self.ideal_pass.slot(gpu, &sequence.scene, &self.buffers));
+            ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));
         }
         let lod = self.ideal_pass.encode(
             gpu,

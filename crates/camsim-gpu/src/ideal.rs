@@ -6,14 +6,15 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, TerrainMesh},
+    scene::{LodSelection, PlacedMesh, Scene},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
 
 use crate::{
     context::GpuContext,
-    layout::{ChunkPlace, IdealCamera},
+    engine::RenderErrorBase,
+    layout::IdealCamera,
     recorder::Recorder,
     shaders::{self, ComposeError, Slot},
     upload::SceneBuffers,
@@ -30,8 +31,8 @@ use fine::{TILE_PX, scale_of, texture};
 use marks::MarksPass;
 #[cfg(test)]
 pub(crate) use marks::spread_slot;
-use near_marks::{Kept, NearMarksPass};
-use surfaces::{Triangles, draw_meshes, draw_terrain, index_buffer, place_meshes, place_terrain};
+use near_marks::NearMarksPass;
+use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -161,21 +162,17 @@ struct SurfacePipelines {
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
-    chunks: wgpu::Buffer,
-    /// Of the terrain's triangles; replaced by a larger one when a frame has more than any before.
-    indices: wgpu::Buffer,
-    /// Those of them that are near marks.
-    kept: Kept,
+    /// None without a terrain.
+    terrain: Option<TerrainSlot>,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
-    terrain_group: Option<wgpu::BindGroup>,
     mesh_groups: Vec<wgpu::BindGroup>,
 }
 
 impl IdealSlot {
     /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their number.
-    pub(crate) fn near_marks(&self) -> &wgpu::Buffer {
-        &self.kept.arguments
+    pub(crate) fn near_marks(&self) -> Option<&wgpu::Buffer> {
+        self.terrain.as_ref().map(|terrain| &terrain.kept.arguments)
     }
 }
 
@@ -194,8 +191,7 @@ impl IdealPass {
         let vertices = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
         let [texture, sampler] = texture_entries();
-        let terrain_layout =
-            layout("camsim.ideal.terrain", &[texture, sampler, buffer_entry(2, vertices, storage), buffer_entry(3, vertices, storage)]);
+        let terrain_layout = layout("camsim.ideal.terrain", &[texture, sampler, buffer_entry(2, vertices, storage)]);
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         Ok(Self {
@@ -230,7 +226,7 @@ impl IdealPass {
 
     /// Buffers for one ideal frame of this scene.
     #[must_use]
-    pub fn slot(&self, gpu: &GpuContext, scene: &Scene, buffers: &SceneBuffers) -> IdealSlot {
+    pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
         let create = |label, size: u64, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -239,29 +235,14 @@ impl IdealPass {
                 mapped_at_creation: false,
             })
         };
-        let chunks = scene.terrain.as_ref().map_or(0, |terrain| terrain.chunks.len());
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let chunks = create("camsim.ideal.chunks", (chunks * size_of::<ChunkPlace>()) as u64, wgpu::BufferUsages::STORAGE);
-        let indices = index_buffer(gpu, 0);
-        let kept = Kept::new(gpu, indices.size());
         let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
         };
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
-        let sampler = wgpu::BindingResource::Sampler(&buffers.sampler);
-        let terrain_group = buffers.terrain.as_ref().map(|terrain| {
-            group(
-                &self.terrain_layout,
-                &[
-                    entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
-                    entry(1, sampler.clone()),
-                    entry(2, terrain.vertices.as_entire_binding()),
-                    entry(3, chunks.as_entire_binding()),
-                ],
-            )
-        });
+        let terrain = buffers.terrain.as_ref().map(|_| TerrainSlot::new(gpu));
         let mesh_groups = buffers.meshes.iter().zip(0_u64..).map(|(mesh, i)| {
             let placement = wgpu::BufferBinding { buffer: &placements, offset: i * PLACEMENT_STRIDE, size: wgpu::BufferSize::new(16) };
             group(
@@ -274,14 +255,14 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, chunks, indices, kept, placements, camera_group, terrain_group, mesh_groups }
+        IdealSlot { camera, terrain, placements, camera_group, mesh_groups }
     }
 
     /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
     /// of detail that the terrain got in the middle one.
     ///
     /// # Errors
-    /// Faults of the shader files.
+    /// Faults of the shader files; [`GpuError::TooLarge`] for triangles that no buffer holds.
     pub fn encode(
         &mut self,
         gpu: &GpuContext,
@@ -290,9 +271,9 @@ impl IdealPass {
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
-        meshes: &[TerrainMesh],
+        meshes: &[PlacedMesh],
         target: &IdealTarget,
-    ) -> Result<LodSelection, ComposeError> {
+    ) -> Result<LodSelection, RenderErrorBase> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
@@ -308,12 +289,13 @@ impl IdealPass {
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
-            let base_ned_m = key.pose.position_ned_m.round();
+            let base_ned_m = base_ned_m(&key.pose);
             recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let mut lod = LodSelection::default();
             let mut indices = 0;
-            if let (Some(terrain), Some(mesh)) = (&scene.terrain, meshes.get(k)) {
-                indices = place_terrain(gpu, recorder, slot, terrain, mesh, base_ned_m);
+            if let (Some(terrain), Some(on_device), Some(mesh)) = (&mut slot.terrain, &buffers.terrain, meshes.get(k)) {
+                indices = place_terrain(gpu, recorder, terrain, mesh)?;
+                terrain.bind(gpu, &self.terrain_layout, on_device, &buffers.sampler);
                 lod = mesh.lod;
             }
             index_counts.push(indices);
@@ -372,6 +354,11 @@ impl IdealPass {
             draw_meshes(pass, pipelines, slot, buffers);
         }
     }
+}
+
+/// What surfaces stand relative to when seen from a camera: in whole metres, so that sums with whole chunk centres are exact.
+pub(crate) fn base_ned_m(pose: &CameraPose) -> DVec3 {
+    pose.position_ned_m.round()
 }
 
 /// Linear colour, cleared to the sky's.

@@ -17,11 +17,9 @@ pub struct SceneBuffers {
     pub sampler: wgpu::Sampler,
 }
 
-/// A terrain on the device; which triangles of it are drawn is found frame by frame.
+/// A terrain on the device, without its triangles: each frame brings those that it draws.
 #[derive(Debug)]
 pub struct TerrainBuffers {
-    /// Five floats a vertex.
-    pub vertices: wgpu::Buffer,
     /// Picture on the ground.
     pub texture: wgpu::TextureView,
 }
@@ -74,14 +72,7 @@ fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
 
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
     let texture = upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?;
-    let floats: Vec<f32> = terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], v.uv[0], v.uv[1]]).collect();
-    gpu.check_storage("the terrain's vertices", 4 * floats.len() as u64, "use a smaller or coarser DEM in scene.terrain.dem")?;
-    let vertices = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("camsim.terrain.vertices"),
-        contents: bytemuck::cast_slice(&floats),
-        usage: wgpu::BufferUsages::STORAGE,
-    });
-    Ok(TerrainBuffers { vertices, texture })
+    Ok(TerrainBuffers { texture })
 }
 
 fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {

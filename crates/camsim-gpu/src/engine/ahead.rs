@@ -13,11 +13,12 @@ use std::{
 use camsim_core::{
     plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, TemporalStage, line_poses, line_times},
     pose::CameraPose,
-    scene::{TerrainDetail, TerrainMesh},
+    scene::{PlacedMesh, TerrainDetail},
     temporal::IdealGeometry,
 };
 
 use super::ms_since;
+use crate::ideal::base_ned_m;
 
 /// Frames that are prepared before they are asked for, at most. Each is some megabytes of triangles and poses.
 const MOST_AHEAD: usize = 4;
@@ -27,7 +28,7 @@ const MOST_AHEAD: usize = 4;
 pub(super) struct Prepared {
     pub plan: FramePlan,
     /// Triangles of the terrain for each key; none without a terrain.
-    pub meshes: Arc<[TerrainMesh]>,
+    pub meshes: Arc<[PlacedMesh]>,
     pub lines: Lines,
     pub plan_ms: f64,
 }
@@ -67,7 +68,7 @@ struct View {
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
-    seen: Mutex<Option<(View, Arc<[TerrainMesh]>)>>,
+    seen: Mutex<Option<(View, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
@@ -83,7 +84,7 @@ impl Preparer {
         Ok(Prepared { plan, meshes, lines, plan_ms: ms_since(begun) })
     }
 
-    fn meshes(&self, plan: &FramePlan) -> Arc<[TerrainMesh]> {
+    fn meshes(&self, plan: &FramePlan) -> Arc<[PlacedMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
         let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px };
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
@@ -94,9 +95,12 @@ impl Preparer {
         let focal_px = plan.ideal.focal_px.max_element();
         let terrain = self.planner.sequence().scene.terrain.iter();
         let meshes = terrain.flat_map(|terrain| {
-            view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh_to_draw())
+            view.poses.iter().map(|pose| {
+                let detail = TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
+                detail.mesh_to_draw().placed(terrain, base_ned_m(pose))
+            })
         });
-        let meshes: Arc<[TerrainMesh]> = meshes.collect();
+        let meshes: Arc<[PlacedMesh]> = meshes.collect();
         *seen() = Some((view, meshes.clone()));
         meshes
     }

@@ -41,7 +41,8 @@ impl Session<'_> {
     /// Device faults; `None` before the first frame.
     pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
         let Some(slot) = self.drawn.as_ref().and_then(|drawn| self.slots[drawn.slot].ideal.first()) else { return Ok(None) };
-        let arguments = read_buffer::<u32>(&self.engine.gpu, slot.near_marks())?;
+        let Some(near_marks) = slot.near_marks() else { return Ok(Some(0)) };
+        let arguments = read_buffer::<u32>(&self.engine.gpu, near_marks)?;
         self.engine.check()?;
         Ok(arguments.first().map(|&indices| u64::from(indices) / 3))
     }
