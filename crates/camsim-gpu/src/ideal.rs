@@ -106,6 +106,11 @@ pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
     ("reads", file)
 }
 
+/// What fills the slot of the surface's picture.
+pub(crate) fn picture_slot(has_tiles: bool) -> Slot {
+    ("picture", if has_tiles { "ideal/picture/tiles.wgsl" } else { "ideal/picture/whole.wgsl" })
+}
+
 /// Format that surfaces are drawn to with one sample a pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
@@ -131,6 +136,8 @@ pub struct IdealPass {
     /// Compiled when first needed.
     pipelines: HashMap<SurfaceKey, SurfacePipelines>,
     color_format: wgpu::TextureFormat,
+    /// Whether the ground's picture is in tiles.
+    has_tiles: bool,
 }
 
 /// What frames with silhouettes take besides drawing.
@@ -181,7 +188,7 @@ impl IdealPass {
     ///
     /// # Errors
     /// Faults of the shader files.
-    pub fn new(gpu: &GpuContext, preset: Preset) -> Result<Self, ComposeError> {
+    pub fn new(gpu: &GpuContext, preset: Preset, has_tiles: bool) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
@@ -190,8 +197,13 @@ impl IdealPass {
         let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, every, wgpu::BufferBindingType::Uniform)]);
         let vertices = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
-        let [texture, sampler] = texture_entries();
-        let terrain_layout = layout("camsim.ideal.terrain", &[texture, sampler, buffer_entry(2, vertices, storage)]);
+        let [texture, sampler] = texture_entries(wgpu::TextureViewDimension::D2);
+        let [tiles, _] = texture_entries(wgpu::TextureViewDimension::D2Array);
+        let pulled = buffer_entry(2, vertices, storage);
+        let terrain_layout = match has_tiles {
+            true => layout("camsim.ideal.terrain", &[tiles, sampler, pulled, buffer_entry(3, wgpu::ShaderStages::FRAGMENT, storage)]),
+            false => layout("camsim.ideal.terrain", &[texture, sampler, pulled]),
+        };
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         Ok(Self {
@@ -201,6 +213,7 @@ impl IdealPass {
             mesh_layout,
             pipelines: HashMap::new(),
             color_format: color_format(preset),
+            has_tiles,
         })
     }
 
@@ -216,11 +229,11 @@ impl IdealPass {
             SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
-        let slot = reads_slot(reads);
+        let slots = |has_tiles| [reads_slot(reads), picture_slot(has_tiles)];
         let (terrain, mesh) = ([&self.camera_layout, &self.terrain_layout], [&self.camera_layout, &self.mesh_layout]);
         Ok(SurfacePipelines {
-            terrain: pipeline(gpu, "ideal/terrain.wgsl", slot, &terrain, &[], samples, format)?,
-            mesh: pipeline(gpu, "ideal/mesh.wgsl", slot, &mesh, &[Some(mesh_vertices)], samples, format)?,
+            terrain: pipeline(gpu, "ideal/terrain.wgsl", &slots(self.has_tiles), &terrain, &[], samples, format)?,
+            mesh: pipeline(gpu, "ideal/mesh.wgsl", &slots(false), &mesh, &[Some(mesh_vertices)], samples, format)?,
         })
     }
 
@@ -295,7 +308,7 @@ impl IdealPass {
             let mut indices = 0;
             if let (Some(terrain), Some(on_device), Some(mesh)) = (&mut slot.terrain, &buffers.terrain, meshes.get(k)) {
                 indices = place_terrain(gpu, recorder, terrain, mesh)?;
-                terrain.bind(gpu, &self.terrain_layout, on_device, &buffers.sampler);
+                terrain.bind(gpu, recorder, &self.terrain_layout, on_device, &buffers.sampler);
                 lod = mesh.lod;
             }
             index_counts.push(indices);
@@ -410,11 +423,11 @@ fn buffer_entry(binding: u32, visibility: wgpu::ShaderStages, ty: wgpu::BufferBi
     wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
 }
 
-fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
+fn texture_entries(view_dimension: wgpu::TextureViewDimension) -> [wgpu::BindGroupLayoutEntry; 2] {
     let visibility = wgpu::ShaderStages::FRAGMENT;
     let texture = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
+        view_dimension,
         multisampled: false,
     };
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
@@ -427,13 +440,13 @@ fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
 fn pipeline(
     gpu: &GpuContext,
     file: &str,
-    slot: Slot,
+    slots: &[Slot],
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
     color: Option<wgpu::TextureFormat>,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
-    let module = shaders::module(&gpu.device, file, file, &[slot])?;
+    let module = shaders::module(&gpu.device, file, file, slots)?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(file),

@@ -169,8 +169,13 @@ mod tests {
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
-        let module =
-            parse(shaders::compose("ideal/terrain.wgsl", &[crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid)]).unwrap());
+        let module = parse(
+            shaders::compose(
+                "ideal/terrain.wgsl",
+                &[crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(true)],
+            )
+            .unwrap(),
+        );
         assert_mirror!(
             &module,
             "IdealCamera",

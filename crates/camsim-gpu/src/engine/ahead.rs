@@ -11,9 +11,9 @@ use std::{
 };
 
 use camsim_core::{
-    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, TemporalStage, line_poses, line_times},
+    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times},
     pose::CameraPose,
-    scene::{PlacedMesh, TerrainDetail},
+    scene::{GroundTiles, PlacedMesh, TerrainDetail},
     temporal::IdealGeometry,
 };
 
@@ -62,18 +62,21 @@ struct View {
     poses: Vec<CameraPose>,
     ideal: IdealGeometry,
     terrain_error_px: f64,
+    reads: SurfaceReads,
 }
 
 /// Prepares frames; the last triangles are kept for as long as they are seen in the same way.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
+    /// Of the ground's picture, if it is in tiles.
+    tiles: Option<Arc<GroundTiles>>,
     seen: Mutex<Option<(View, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
-    pub fn new(planner: Arc<Planner>) -> Self {
-        Self { planner, seen: Mutex::new(None) }
+    pub fn new(planner: Arc<Planner>, tiles: Option<Arc<GroundTiles>>) -> Self {
+        Self { planner, tiles, seen: Mutex::new(None) }
     }
 
     fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
@@ -86,7 +89,7 @@ impl Preparer {
 
     fn meshes(&self, plan: &FramePlan) -> Arc<[PlacedMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
-        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px };
+        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px, reads: plan.surface_reads };
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
         let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, meshes)) = seen().as_ref().filter(|(seen, _)| *seen == view) {
@@ -97,7 +100,8 @@ impl Preparer {
         let meshes = terrain.flat_map(|terrain| {
             view.poses.iter().map(|pose| {
                 let detail = TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
-                detail.mesh_to_draw().placed(terrain, base_ned_m(pose))
+                let tiles = self.tiles.as_ref().map_or_else(Vec::new, |tiles| detail.tiles(tiles, view.reads));
+                PlacedMesh { tiles, ..detail.mesh_to_draw().placed(terrain, base_ned_m(pose)) }
             })
         });
         let meshes: Arc<[PlacedMesh]> = meshes.collect();

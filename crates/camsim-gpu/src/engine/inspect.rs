@@ -46,4 +46,10 @@ impl Session<'_> {
         self.engine.check()?;
         Ok(arguments.first().map(|&indices| u64::from(indices) / 3))
     }
+
+    /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture that is held whole.
+    #[must_use]
+    pub fn tiles_held(&self) -> Option<[usize; 2]> {
+        self.buffers.tiles().map(|tiles| [tiles.held().0, tiles.ground.grid.count as usize])
+    }
 }

@@ -7,7 +7,8 @@ use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines, near_marks::Kept};
 use crate::{
     context::{GpuContext, GpuError},
     recorder::Recorder,
-    upload::{SceneBuffers, TerrainBuffers},
+    tiles::TilePool,
+    upload::{GroundPicture, SceneBuffers, TerrainBuffers},
 };
 
 /// Room for a few thousand triangles, bytes.
@@ -42,6 +43,8 @@ pub(super) struct TerrainSlot {
     pub indices: wgpu::Buffer,
     /// Those of the triangles that are near marks.
     pub kept: Kept,
+    /// Where tiles of the picture are, and the state of theirs that it tells.
+    table: Option<(wgpu::Buffer, [u64; 2])>,
     /// Picture and vertices.
     pub group: Option<wgpu::BindGroup>,
 }
@@ -50,20 +53,49 @@ impl TerrainSlot {
     pub fn new(gpu: &GpuContext) -> Self {
         let indices = index_buffer(gpu, 0);
         let kept = Kept::new(gpu, indices.size());
-        Self { vertices: vertex_buffer(gpu, 0), indices, kept, group: None }
+        Self { vertices: vertex_buffer(gpu, 0), indices, kept, table: None, group: None }
     }
 
-    /// Makes what binds picture and vertices, if they are new.
-    pub fn bind(&mut self, gpu: &GpuContext, layout: &wgpu::BindGroupLayout, terrain: &TerrainBuffers, sampler: &wgpu::Sampler) {
+    /// Makes what binds picture and vertices, if they are new, and writes where the picture's tiles are, if that has changed.
+    pub fn bind(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        layout: &wgpu::BindGroupLayout,
+        terrain: &TerrainBuffers,
+        sampler: &wgpu::Sampler,
+    ) {
+        let view = match &terrain.picture {
+            GroundPicture::Whole(view) => Some(view),
+            GroundPicture::Tiles(tiles) => {
+                self.tell_tiles(gpu, recorder, tiles);
+                tiles.view()
+            }
+        };
+        let Some(view) = view else { return };
         self.group.get_or_insert_with(|| {
             let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
-            let entries = [
-                entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
+            let mut entries = vec![
+                entry(0, wgpu::BindingResource::TextureView(view)),
                 entry(1, wgpu::BindingResource::Sampler(sampler)),
                 entry(2, self.vertices.as_entire_binding()),
             ];
+            entries.extend(self.table.as_ref().map(|(table, _)| entry(3, table.as_entire_binding())));
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.terrain"), layout, entries: &entries })
         });
+    }
+
+    fn tell_tiles(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, tiles: &TilePool) {
+        let (table, told) =
+            self.table.get_or_insert_with(|| (create(gpu, "camsim.ideal.tiles", tiles.table_bytes(), wgpu::BufferUsages::STORAGE), [0; 2]));
+        let now = tiles.changes();
+        if *told != now {
+            tiles.write_table(recorder, table);
+        }
+        if told[1] != now[1] {
+            self.group = None;
+        }
+        *told = now;
     }
 }
 

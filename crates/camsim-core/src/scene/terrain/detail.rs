@@ -213,6 +213,14 @@ impl<'a> TerrainDetail<'a> {
         self.of_square(known, 0, column, row) != OUT_OF_SIGHT
     }
 
+    /// Least depth of what is in sight of a square, and distance over depth at most; `None` out of sight.
+    pub(super) fn least_depth(&self, cells: u32, at: [i64; 2]) -> Option<(f64, f64)> {
+        let bounds = self.terrain.tree.square(cells, at).filter(|bounds| self.judge.frustum.may_see(bounds))?;
+        let position_ned_m = self.judge.position_ned_m;
+        let from_camera = Aabb { min: bounds.min - position_ned_m, max: bounds.max - position_ned_m };
+        Some((self.judge.depths(&from_camera).0, self.judge.slant))
+    }
+
     fn strictest(&self, known: &Tolerances, squares: &Squares) -> u16 {
         let mut strictest = OUT_OF_SIGHT;
         for row in squares.rows() {

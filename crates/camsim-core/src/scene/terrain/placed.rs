@@ -12,6 +12,8 @@ pub struct PlacedMesh {
     pub vertices: Vec<[f32; 5]>,
     /// Three a triangle.
     pub indices: Vec<u32>,
+    /// Tiles of the ground's picture that they may be read from; none for a picture that is whole.
+    pub tiles: Vec<u32>,
     /// What that comes to.
     pub lod: LodSelection,
 }
