@@ -14,7 +14,7 @@ use super::Outcome;
 /// Between two heights.
 const CELL_M: f64 = 10.0;
 /// From the camera down to the ground's middle height.
-const BELOW_M: f64 = 2000.0;
+const BELOW_M: f64 = 900.0;
 /// Side of the picture on the ground; beyond it its border goes on.
 const PICTURE_M: f64 = 5000.0;
 

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 /// Every texel another colour, with larger patches: nothing hides a read that is off.
 fn ground() -> Scene {
-    let [width, height] = [2501_u32, 1803];
+    let [width, height] = [4001_u32, 2884];
     let mix = |mut n: u32| {
         n = (n ^ (n >> 16)).wrapping_mul(0x7feb_352d);
         n = (n ^ (n >> 15)).wrapping_mul(0x846c_a68b);
@@ -34,14 +34,14 @@ fn ground() -> Scene {
     Scene { terrain: Some(terrain), sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }
 }
 
-fn flight(max_error_dn: f64, pitch_deg: f64) -> Arc<Sequence> {
+fn flight(ground: &Scene, max_error_dn: f64, pitch_deg: f64) -> Arc<Sequence> {
     let mut scenario: Scenario = scenario();
     scenario.quality.max_error_dn = max_error_dn;
     scenario.camera.size_px = [320, 240];
     scenario.camera.focal_px = [250.0, 240.0];
-    scenario.camera.fps = 10.0;
+    scenario.camera.fps = 2.0;
     scenario.camera.mount = MountSpec { angles_deg: [0.0, pitch_deg, 0.0], ..MountSpec::default() };
-    sequence(scenario, steady(160.0, 20.0, DVec3::new(120.0, 90.0, -20.0), DVec3::ZERO), ground())
+    sequence(scenario, steady(160.0, 20.0, DVec3::new(120.0, 90.0, -20.0), DVec3::ZERO), ground.clone())
 }
 
 /// Ideal frames with the picture whole (`None`) or in tiles, how they read it, and tiles on the device, of all.
@@ -66,14 +66,18 @@ fn ideal_frames(sequence: &Arc<Sequence>, limit_px: Option<u32>, frames: &[u64])
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn tiles_show_what_one_texture_does() {
+    let ground = ground();
     let mut seen = Vec::new();
-    for (max_error_dn, pitch_deg) in [(16.0, -90.0), (1.0, -30.0), (0.05, -12.0)] {
-        let sequence = flight(max_error_dn, pitch_deg);
-        let frames = [0, 9, 18, 1];
-        let (whole, reads, none) = ideal_frames(&sequence, None, &frames);
-        let (tiled, _, held) = ideal_frames(&sequence, Some(512), &frames);
+    // Straight down over so much ground that tiles make room for others, and for some of them again.
+    let far: &[u64] = &[0, 6, 12, 16, 1];
+    for (max_error_dn, pitch_deg, frames) in [(16.0, -90.0, far), (1.0, -30.0, &[0]), (0.05, -12.0, &[0, 6])] {
+        let sequence = flight(&ground, max_error_dn, pitch_deg);
+        let (whole, reads, none) = ideal_frames(&sequence, None, frames);
+        let (tiled, _, held) = ideal_frames(&sequence, Some(512), frames);
         assert_eq!(none, None);
         let [held, all] = held.expect("tiles");
+        // One layer has room for 64.
+        assert!(frames.len() < 3 || held == 64, "{held}");
         for (frame, (whole, tiled)) in frames.iter().zip(whole.iter().zip(&tiled)) {
             assert_eq!((whole.0, &whole.2), (tiled.0, &tiled.2), "geometry and depth are the same");
             let differences: Vec<f32> = whole.1.iter().zip(&tiled.1).map(|(a, b)| (a - b).abs()).collect();
@@ -84,7 +88,8 @@ fn tiles_show_what_one_texture_does() {
                 255.0 * largest,
                 255.0 * mean
             );
-            assert!(255.0 * largest < 1.0 && 255.0 * mean < 0.02, "{largest} {mean}");
+            // Half floats below 1 are up to 0.12/255 apart.
+            assert!(255.0 * largest < 0.26 && 255.0 * mean < 0.002, "{largest} {mean}");
         }
         seen.push(reads);
         assert!(held < all);

@@ -154,11 +154,14 @@ impl TileSource {
         let within = |at: i64, side: u32| at.clamp(0, i64::from(side) - 1) as usize;
         let mut texels = Vec::with_capacity(TILE_BYTES as usize);
         for row in 0..i64::from(TILE_SIDE) {
-            let start = within(north + row, height) * width as usize;
-            for column in 0..i64::from(TILE_SIDE) {
-                let at = 4 * (start + within(west + column, width));
-                texels.extend_from_slice(&rgba8[at..at + 4]);
-            }
+            let row = &rgba8[4 * within(north + row, height) * width as usize..][..4 * width as usize];
+            // What lies within the picture is one piece; its ends are repeated to both sides.
+            let [first, last] = [west, west + i64::from(TILE_SIDE) - 1].map(|column| within(column, width));
+            let before = first as i64 - west;
+            (0..before).for_each(|_| texels.extend_from_slice(&row[..4]));
+            texels.extend_from_slice(&row[4 * first..4 * last + 4]);
+            let after = i64::from(TILE_SIDE) - before - (last - first) as i64 - 1;
+            (0..after).for_each(|_| texels.extend_from_slice(&row[4 * last..4 * last + 4]));
         }
         texels
     }

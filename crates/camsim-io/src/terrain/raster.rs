@@ -25,6 +25,11 @@ const MAX_COMPRESSION: u64 = 2000;
 /// Small files may always decode to this, bytes.
 const MIN_LIMIT: u64 = 64 << 20;
 
+/// What a file of so many bytes may decode to, bytes: a few bytes must not ask for all memory.
+pub(crate) fn most_decoded(bytes: u64) -> u64 {
+    bytes.saturating_mul(MAX_COMPRESSION).max(MIN_LIMIT)
+}
+
 /// A decoded TIFF.
 pub(crate) struct Raster {
     pub size: [u32; 2],
@@ -72,7 +77,7 @@ impl Raster {
 
     fn decode(file: BufReader<File>, bytes: u64) -> Result<Self, String> {
         let mut limits = Limits::default();
-        limits.decoding_buffer_size = usize::try_from((bytes * MAX_COMPRESSION).max(MIN_LIMIT)).unwrap_or(usize::MAX);
+        limits.decoding_buffer_size = usize::try_from(most_decoded(bytes)).unwrap_or(usize::MAX);
         limits.intermediate_buffer_size = limits.decoding_buffer_size;
         // A large image in strips of one row has large lists of offsets.
         limits.ifd_value_size = 64 << 20;

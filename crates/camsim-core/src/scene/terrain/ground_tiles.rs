@@ -27,7 +27,16 @@ pub struct GroundTiles {
     /// How the picture is cut.
     pub grid: TileGrid,
     chunks: Vec<ChunkPicture>,
+    /// [`SQUARES`] of each chunk.
+    uvs: Vec<UvBox>,
 }
+
+/// Least and largest texture coordinates.
+type UvBox = [[f32; 2]; 2];
+
+/// Squares of a chunk of all [`NODE_CELLS`], and where those of each size begin.
+const SQUARES: usize = 64 + 16 + 4 + 1;
+const FIRST: [usize; NODE_CELLS.len()] = [0, 64, 64 + 16, 64 + 16 + 4];
 
 #[derive(Clone, Copy, Debug)]
 struct ChunkPicture {
@@ -72,8 +81,17 @@ impl GroundTiles {
     #[must_use]
     pub fn new(terrain: &Terrain) -> Self {
         let grid = TileGrid::new(terrain.texture.size_px);
-        let chunks = (0..terrain.chunks.len() as u32).into_par_iter().map(|chunk| chunk_picture(terrain, chunk)).collect();
-        Self { grid, chunks }
+        let all = 0..terrain.chunks.len() as u32;
+        let chunks = all.clone().into_par_iter().map(|chunk| chunk_picture(terrain, chunk)).collect();
+        let uvs = all.into_par_iter().flat_map_iter(|chunk| chunk_uvs(terrain, chunk)).collect();
+        Self { grid, chunks, uvs }
+    }
+
+    /// Texture coordinates around a square of a chunk's cells, of one of [`NODE_CELLS`].
+    fn uvs(&self, chunk: u32, at: [i64; 2], size: usize) -> [[f64; 2]; 2] {
+        let along = i64::from(CHUNK_CELLS / NODE_CELLS[size]);
+        let [column, row] = at.map(|n| (n % along) as usize);
+        self.uvs[chunk as usize * SQUARES + FIRST[size] + row * along as usize + column].map(|uv| uv.map(f64::from))
     }
 
     /// Memory that all tiles of the picture would take on a device.
@@ -110,7 +128,7 @@ impl TerrainDetail<'_> {
         let filter = Reads::of(reads);
         let grid = &ground.grid;
         let finest = filter.finest(reads, longer, shorter).min(grid.sizes.len() - 1);
-        let [low, high] = self.uvs(chunk, at, cells);
+        let [low, high] = ground.uvs(chunk, at, size);
         let [columns, rows] = grid.between(finest, low, high, filter.reach);
         if size > 0 && finest + 1 < grid.sizes.len() && (columns[1] - columns[0] + 1) * (rows[1] - rows[0] + 1) > MANY_TILES {
             for [i, j] in [[0, 0], [1, 0], [0, 1], [1, 1]] {
@@ -128,24 +146,25 @@ impl TerrainDetail<'_> {
             }
         }
     }
+}
 
-    /// Texture coordinates around a square of a chunk's cells.
-    fn uvs(&self, chunk: u32, at: [i64; 2], cells: u32) -> [[f64; 2]; 2] {
-        let of = &self.terrain.chunks[chunk as usize];
-        let per_chunk = i64::from(CHUNK_CELLS / cells);
-        let [[i0, i1], [j0, j1]] = [0, 1].map(|k: usize| {
-            let first = (at[k] % per_chunk) as u32 * cells;
-            [first.min(of.cells[k]), (first + cells).min(of.cells[k])]
-        });
-        let mut range = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        for j in j0..=j1 {
-            for i in i0..=i1 {
-                let uv = self.terrain.vertices[(of.first_vertex + j * (of.cells[0] + 1) + i) as usize].uv.map(f64::from);
-                range = [[0, 1].map(|k: usize| range[0][k].min(uv[k])), [0, 1].map(|k: usize| range[1][k].max(uv[k]))];
+fn chunk_uvs(terrain: &Terrain, chunk: u32) -> Vec<UvBox> {
+    let of = &terrain.chunks[chunk as usize];
+    let mut boxes = vec![[[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]]; SQUARES];
+    for (size, cells) in NODE_CELLS.into_iter().enumerate() {
+        let along = CHUNK_CELLS / cells;
+        for square in 0..along * along {
+            let [i0, j0] = [square % along * cells, square / along * cells];
+            let range = &mut boxes[FIRST[size] + square as usize];
+            for j in j0..=(j0 + cells).min(of.cells[1]) {
+                for i in i0..=(i0 + cells).min(of.cells[0]) {
+                    let uv = terrain.vertices[(of.first_vertex + j * (of.cells[0] + 1) + i) as usize].uv;
+                    *range = [[0, 1].map(|k: usize| range[0][k].min(uv[k])), [0, 1].map(|k: usize| range[1][k].max(uv[k]))];
+                }
             }
         }
-        range
     }
+    boxes
 }
 
 fn chunk_picture(terrain: &Terrain, chunk: u32) -> ChunkPicture {
