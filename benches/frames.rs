@@ -6,7 +6,7 @@
 //! that this program's threads had a processor stands beside it: with a software adapter that is the work itself, whatever else runs.
 //!
 //! A second table is of terrains of different sizes: the same ground seen straight down, so that only what is out of sight differs. Sides are
-//! those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 8 GB and some minutes to make).
+//! those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 10 GB and some minutes to make).
 //!
 //! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 

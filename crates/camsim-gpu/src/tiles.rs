@@ -119,7 +119,7 @@ impl TilePool {
             return Err(GpuError::TooLarge {
                 what: format!(
                     "what one frame reads of scene.terrain.ortho ({} MiB in {tiles} tiles, in layers of {TILES_A_LAYER})",
-                    u64::from(tiles) * TILE_BYTES >> 20
+                    (u64::from(tiles) * TILE_BYTES) >> 20
                 ),
                 needed: needed.into(),
                 limit_name: "max_texture_array_layers",

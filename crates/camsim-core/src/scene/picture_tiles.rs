@@ -212,7 +212,7 @@ mod tests {
         for seed in 0..20 {
             // The last ones are always there.
             let last = grid.first[grid.sizes.len() - 6];
-            let is_there = |tile: u32| tile >= last || crate::noise::pcg4d([tile, seed, 0, 0])[0] % 3 == 0;
+            let is_there = |tile: u32| tile >= last || crate::noise::pcg4d([tile, seed, 0, 0])[0].is_multiple_of(3);
             let table = grid.table(&|tile| is_there(tile).then_some(tile + 5));
             let mut far = 0;
             for tile in 0..grid.count {
