@@ -25,8 +25,8 @@ struct Hills {
 }
 
 impl Hills {
-    /// North, east from the middle.
-    fn from_middle_m(&self, [column, row]: [u32; 2]) -> DVec2 {
+    /// North and east of the middle.
+    fn place_m(&self, [column, row]: [u32; 2]) -> DVec2 {
         let at = |n: u32| f64::from(n) - f64::from(self.side / 2);
         CELL_M * DVec2::new(-at(row), at(column))
     }
@@ -34,7 +34,7 @@ impl Hills {
 
 impl TerrainGrid for Hills {
     fn point_ned_m(&self, at: [u32; 2]) -> DVec3 {
-        let place = self.from_middle_m(at);
+        let place = self.place_m(at);
         // Of all sizes from 90 m to 23 km, slopes up to one in two.
         let height_m: f64 = (0..9)
             .map(|octave| {
@@ -47,7 +47,7 @@ impl TerrainGrid for Hills {
     }
 
     fn uv(&self, at: [u32; 2]) -> [f32; 2] {
-        let place = self.from_middle_m(at) / PICTURE_M;
+        let place = self.place_m(at) / PICTURE_M;
         [(0.5 + place.y) as f32, (0.5 - place.x) as f32]
     }
 }
