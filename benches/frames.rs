@@ -5,6 +5,9 @@
 //! a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it, files are not. On Linux the time
 //! that this program's threads had a processor stands beside it: with a software adapter that is the work itself, whatever else runs.
 //!
+//! A second table is of terrains of different sizes: the same ground seen straight down, so that only what is out of sight differs. Sides are
+//! those of `CAMSIM_TERRAIN_SIDES` ("513 1025 4097"; 16385 takes 10 GB and some minutes to make).
+//!
 //! `cargo bench --bench frames`; `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the table is what this program is for")]
@@ -28,12 +31,14 @@ use flight::{Outcome, Without};
 const BURST: u64 = 4;
 /// Rounds, unless time runs out before.
 const ROUNDS: usize = 25;
+/// Pictures of larger sides are in tiles, where that is measured.
+const SMALL_PICTURE_PX: u32 = 256;
 /// No round begins after this.
 const BUDGET: Duration = Duration::from_secs(90);
 
 /// One row of the table.
 struct Variant<'a> {
-    name: &'static str,
+    name: String,
     session: Session<'a>,
     /// Renders one frame over and over: its ideal frame is drawn once and kept.
     still: bool,
@@ -73,19 +78,49 @@ fn main() -> Outcome<()> {
         let mut session = engine.session::<Infallible>(without.of(demo)?, channels)?;
         // The first dispatch of a pipeline compiles it.
         render(&mut session, 0..2)?;
-        variants.push(Variant { name, session, still, start: begin.elapsed(), ms: Vec::new(), processor_ms: Vec::new() });
+        variants.push(Variant { name: name.to_owned(), session, still, start: begin.elapsed(), ms: Vec::new(), processor_ms: Vec::new() });
     }
     let plan = variants[0].session.planner().plan(0)?;
     let [ideal_width, ideal_height] = plan.ideal.size_px;
     println!("ideal     {ideal_width}x{ideal_height} px in frame 0, {} exposure nodes", plan.blur.map_or(1, |blur| blur.nodes));
 
+    measure(&mut variants, demo.frames, measuring)?;
+    print_table(&variants, "the full camera");
+    drop(variants);
+
+    let sides = std::env::var("CAMSIM_TERRAIN_SIDES").unwrap_or("513 1025 4097".into());
+    let mut with_tiles = Engine::new(AdapterChoice::Best)?;
+    with_tiles.limit_pictures(SMALL_PICTURE_PX);
+    let mut sizes = Vec::new();
+    for side in sides.split_whitespace().take(if measuring { usize::MAX } else { 1 }) {
+        let begin = Instant::now();
+        let sequence = flight::ground::looking_down(demo, side.parse()?)?;
+        println!("{side} x {side} heights: made in {:.1} s", begin.elapsed().as_secs_f64());
+        // The smallest also with its picture in tiles.
+        for (engine, what) in
+            [(&engine, "heights"), (&with_tiles, "heights, the picture in tiles")].into_iter().take(2 - sizes.len().min(1))
+        {
+            let begin = Instant::now();
+            let mut session = engine.session::<Infallible>(sequence.clone(), plain)?;
+            render(&mut session, 0..2)?;
+            let name = format!("{side} x {side} {what}");
+            sizes.push(Variant { name, session, still: false, start: begin.elapsed(), ms: Vec::new(), processor_ms: Vec::new() });
+        }
+    }
+    measure(&mut sizes, demo.frames, measuring)?;
+    print_table(&sizes, "the first");
+    Ok(())
+}
+
+/// Rounds in which each variant renders the same frames.
+fn measure(variants: &mut [Variant<'_>], frames: u64, measuring: bool) -> Outcome<()> {
     let begin = Instant::now();
     for round in 0..if measuring { ROUNDS } else { 1 } {
         if begin.elapsed() > BUDGET {
             break;
         }
         let burst = if measuring { BURST } else { 1 };
-        let first = (round as u64 * BURST) % (demo.frames - BURST);
+        let first = (round as u64 * BURST) % (frames - BURST);
         // Each variant takes each place in the round once in a while.
         let count = variants.len();
         for place in 0..count {
@@ -100,7 +135,6 @@ fn main() -> Outcome<()> {
             variant.processor_ms.extend(busy.zip(processor_ms()).map(|(before, after)| (after - before) / burst as f64));
         }
     }
-    print_table(&variants);
     Ok(())
 }
 
@@ -111,11 +145,12 @@ fn render(session: &mut Session<'_>, frames: impl IntoIterator<Item = u64>) -> O
     })?)
 }
 
-fn print_table(variants: &[Variant<'_>]) {
+fn print_table(variants: &[Variant<'_>], first: &str) {
     let full = &variants[0];
+    println!();
     println!("rounds    {} of {BURST} frames, variants in turn; medians, quartiles in brackets", full.ms.len());
     println!();
-    println!("| variant | ms a frame | frames/s | to the full camera | processor ms a frame | to the full camera | start, s |");
+    println!("| variant | ms a frame | frames/s | to {first} | processor ms a frame | to {first} | start, s |");
     println!("|---|---|---|---|---|---|---|");
     for variant in variants {
         let rate = 1e3 / quartiles(&variant.ms)[1];

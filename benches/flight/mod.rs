@@ -17,6 +17,8 @@ use camsim::{
     },
 };
 
+pub mod ground;
+
 /// Whatever may go wrong: a benchmark stops and says so.
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 

@@ -16,7 +16,8 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
 
 // What reads the picture: the `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
 // filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter.
-@group(1) @binding(0) var surface_texture: texture_2d<f32>;
+// Where the picture is: the `picture` slot, in one texture or in tiles.
+#import <slot:picture>
 @group(1) @binding(1) var surface_sampler: sampler;
 
 // The ellipse that stands for a pixel on the picture, texels.
@@ -30,7 +31,7 @@ struct Pixel {
 }
 
 fn pixel_at(uv: vec2<f32>) -> Pixel {
-    let size = vec2<f32>(textureDimensions(surface_texture));
+    let size = picture_size();
     let dx = dpdx(uv) * size;
     let dy = dpdy(uv) * size;
     // The axes are the singular values of [dx dy]: roots of the eigenvalues of the symmetric [[a, b], [b, c]].
@@ -46,10 +47,6 @@ fn pixel_at(uv: vec2<f32>) -> Pixel {
     // A circle has no longer axis: any will do.
     let along = select(vec2<f32>(1.0, 0.0), both / max(length(both), 1e-20), spread > 1e-6 * mean);
     return Pixel(size, sqrt(mean + spread), sqrt(max(mean - spread, 0.0)), along);
-}
-
-fn picture_read(uv: vec2<f32>, level: f32) -> vec3<f32> {
-    return textureSampleLevel(surface_texture, surface_sampler, uv, level).rgb;
 }
 
 // What a read is of.

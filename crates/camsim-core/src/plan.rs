@@ -39,7 +39,7 @@ mod rounding;
 mod sight;
 mod stages;
 mod surfaces;
-mod transfer;
+pub(crate) mod transfer;
 
 pub use bounds::LensReach;
 pub use contours::Contours;

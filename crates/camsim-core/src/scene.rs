@@ -5,13 +5,15 @@
 
 pub(crate) mod box_tree;
 pub mod mesh;
+pub mod picture_tiles;
 pub mod terrain;
 pub mod texture;
 
 pub use mesh::{Mesh, MeshVertex, Wrap};
+pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, LodSelection, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainHit, TerrainMesh, TerrainVertex,
-    VERTEX_BITS,
+    Aabb, CHUNK_CELLS, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid, TerrainHit,
+    TerrainMesh, TerrainVertex, VERTEX_BITS,
 };
 pub use texture::{Encoding, MipLevel, Texture, linear_from_srgb, srgb_from_linear};
 

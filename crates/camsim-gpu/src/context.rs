@@ -89,6 +89,8 @@ pub struct GpuContext {
     pub queue: wgpu::Queue,
     /// Description of the adapter.
     pub adapter: AdapterSummary,
+    /// Largest side of a picture that is held whole.
+    pub(crate) max_picture_px: u32,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -152,7 +154,8 @@ impl GpuContext {
         });
         let (device, queue) =
             pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
-        Ok(Self { device, queue, adapter: summary })
+        let max_picture_px = device.limits().max_texture_dimension_2d;
+        Ok(Self { device, queue, adapter: summary, max_picture_px })
     }
 
     /// Largest side of a texture.

@@ -41,7 +41,7 @@ mod slot;
 
 use ahead::{Ahead, Prepared, Preparer};
 pub use error::RenderError;
-use error::RenderErrorBase;
+pub(crate) use error::RenderErrorBase;
 pub use inspect::IdealImages;
 use readback::{Output, coords, look_for_unknown, read_mapped};
 use slot::{Slot, Target, list_buffer, pose_buffer};
@@ -90,6 +90,11 @@ impl Engine {
         &self.gpu
     }
 
+    /// Holds pictures of larger sides in tiles, as if textures ended there: for tests, and where the device's memory is short.
+    pub fn limit_pictures(&mut self, max_side_px: u32) {
+        self.gpu.max_picture_px = max_side_px.min(self.gpu.max_side_px());
+    }
+
     /// Uploads a sequence and prepares for its frames.
     ///
     /// # Errors
@@ -109,7 +114,7 @@ impl Engine {
         }
         let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let preset = sequence.scenario.quality.preset;
-        let ideal_pass = IdealPass::new(gpu, preset)?;
+        let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some())?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
         let camera = &sequence.scenario.camera;
         let weights = match &sequence.vignette {
@@ -258,7 +263,7 @@ impl Session<'_> {
         frames: impl IntoIterator<Item = u64>,
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
-        let preparer = Preparer::new(self.planner.clone());
+        let preparer = Preparer::new(self.planner.clone(), self.buffers.tiles().map(|tiles| tiles.ground.clone()));
         rayon::in_place_scope(|scope| {
             let mut ahead = Ahead::start(scope, &preparer, frames.into_iter());
             let mut in_flight: Option<InFlight> = None;
@@ -357,7 +362,7 @@ impl Session<'_> {
     }
 
     /// Pass 2, only when a key pose or the ideal frames' geometry has changed: the ideal frames.
-    fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), ComposeError> {
+    fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), RenderErrorBase> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         if self.drawn.as_ref().is_some_and(|drawn| {
@@ -387,7 +392,13 @@ impl Session<'_> {
         let sequence = self.planner.sequence();
         let ideal_slots = &mut self.slots[slot].ideal;
         while ideal_slots.len() < poses.len() {
-            ideal_slots.push(self.ideal_pass.slot(gpu, &sequence.scene, &self.buffers));
+            ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));
+        }
+        if let Some(pool) = self.buffers.tiles_mut() {
+            let mut tiles: Vec<u32> = prepared.meshes.iter().flat_map(|mesh| mesh.tiles.iter().copied()).collect();
+            tiles.sort_unstable();
+            tiles.dedup();
+            pool.bring(gpu, &tiles)?;
         }
         let lod = self.ideal_pass.encode(
             gpu,

@@ -6,14 +6,15 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, Scene, TerrainMesh},
+    scene::{LodSelection, PlacedMesh, Scene},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
 
 use crate::{
     context::GpuContext,
-    layout::{ChunkPlace, IdealCamera},
+    engine::RenderErrorBase,
+    layout::IdealCamera,
     recorder::Recorder,
     shaders::{self, ComposeError, Slot},
     upload::SceneBuffers,
@@ -30,8 +31,8 @@ use fine::{TILE_PX, scale_of, texture};
 use marks::MarksPass;
 #[cfg(test)]
 pub(crate) use marks::spread_slot;
-use near_marks::{Kept, NearMarksPass};
-use surfaces::{Triangles, draw_meshes, draw_terrain, index_buffer, place_meshes, place_terrain};
+use near_marks::NearMarksPass;
+use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
@@ -105,6 +106,11 @@ pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
     ("reads", file)
 }
 
+/// What fills the slot of the surface's picture.
+pub(crate) fn picture_slot(has_tiles: bool) -> Slot {
+    ("picture", if has_tiles { "ideal/picture/tiles.wgsl" } else { "ideal/picture/whole.wgsl" })
+}
+
 /// Format that surfaces are drawn to with one sample a pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
@@ -130,6 +136,8 @@ pub struct IdealPass {
     /// Compiled when first needed.
     pipelines: HashMap<SurfaceKey, SurfacePipelines>,
     color_format: wgpu::TextureFormat,
+    /// Whether the ground's picture is in tiles.
+    has_tiles: bool,
 }
 
 /// What frames with silhouettes take besides drawing.
@@ -161,21 +169,17 @@ struct SurfacePipelines {
 #[derive(Debug)]
 pub struct IdealSlot {
     camera: wgpu::Buffer,
-    chunks: wgpu::Buffer,
-    /// Of the terrain's triangles; replaced by a larger one when a frame has more than any before.
-    indices: wgpu::Buffer,
-    /// Those of them that are near marks.
-    kept: Kept,
+    /// None without a terrain.
+    terrain: Option<TerrainSlot>,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
-    terrain_group: Option<wgpu::BindGroup>,
     mesh_groups: Vec<wgpu::BindGroup>,
 }
 
 impl IdealSlot {
     /// Arguments of the draw of the terrain's triangles near marks, the first of them three times their number.
-    pub(crate) fn near_marks(&self) -> &wgpu::Buffer {
-        &self.kept.arguments
+    pub(crate) fn near_marks(&self) -> Option<&wgpu::Buffer> {
+        self.terrain.as_ref().map(|terrain| &terrain.kept.arguments)
     }
 }
 
@@ -184,7 +188,7 @@ impl IdealPass {
     ///
     /// # Errors
     /// Faults of the shader files.
-    pub fn new(gpu: &GpuContext, preset: Preset) -> Result<Self, ComposeError> {
+    pub fn new(gpu: &GpuContext, preset: Preset, has_tiles: bool) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
@@ -193,9 +197,13 @@ impl IdealPass {
         let camera_layout = layout("camsim.ideal.camera", &[buffer_entry(0, every, wgpu::BufferBindingType::Uniform)]);
         let vertices = wgpu::ShaderStages::VERTEX | wgpu::ShaderStages::COMPUTE;
         let storage = wgpu::BufferBindingType::Storage { read_only: true };
-        let [texture, sampler] = texture_entries();
-        let terrain_layout =
-            layout("camsim.ideal.terrain", &[texture, sampler, buffer_entry(2, vertices, storage), buffer_entry(3, vertices, storage)]);
+        let [texture, sampler] = texture_entries(wgpu::TextureViewDimension::D2);
+        let [tiles, _] = texture_entries(wgpu::TextureViewDimension::D2Array);
+        let pulled = buffer_entry(2, vertices, storage);
+        let terrain_layout = match has_tiles {
+            true => layout("camsim.ideal.terrain", &[tiles, sampler, pulled, buffer_entry(3, wgpu::ShaderStages::FRAGMENT, storage)]),
+            false => layout("camsim.ideal.terrain", &[texture, sampler, pulled]),
+        };
         let mesh_layout =
             layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
         Ok(Self {
@@ -205,6 +213,7 @@ impl IdealPass {
             mesh_layout,
             pipelines: HashMap::new(),
             color_format: color_format(preset),
+            has_tiles,
         })
     }
 
@@ -220,17 +229,17 @@ impl IdealPass {
             SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
-        let slot = reads_slot(reads);
+        let slots = |has_tiles| [reads_slot(reads), picture_slot(has_tiles)];
         let (terrain, mesh) = ([&self.camera_layout, &self.terrain_layout], [&self.camera_layout, &self.mesh_layout]);
         Ok(SurfacePipelines {
-            terrain: pipeline(gpu, "ideal/terrain.wgsl", slot, &terrain, &[], samples, format)?,
-            mesh: pipeline(gpu, "ideal/mesh.wgsl", slot, &mesh, &[Some(mesh_vertices)], samples, format)?,
+            terrain: pipeline(gpu, "ideal/terrain.wgsl", &slots(self.has_tiles), &terrain, &[], samples, format)?,
+            mesh: pipeline(gpu, "ideal/mesh.wgsl", &slots(false), &mesh, &[Some(mesh_vertices)], samples, format)?,
         })
     }
 
     /// Buffers for one ideal frame of this scene.
     #[must_use]
-    pub fn slot(&self, gpu: &GpuContext, scene: &Scene, buffers: &SceneBuffers) -> IdealSlot {
+    pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
         let create = |label, size: u64, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -239,29 +248,14 @@ impl IdealPass {
                 mapped_at_creation: false,
             })
         };
-        let chunks = scene.terrain.as_ref().map_or(0, |terrain| terrain.chunks.len());
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let chunks = create("camsim.ideal.chunks", (chunks * size_of::<ChunkPlace>()) as u64, wgpu::BufferUsages::STORAGE);
-        let indices = index_buffer(gpu, 0);
-        let kept = Kept::new(gpu, indices.size());
         let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
         };
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
-        let sampler = wgpu::BindingResource::Sampler(&buffers.sampler);
-        let terrain_group = buffers.terrain.as_ref().map(|terrain| {
-            group(
-                &self.terrain_layout,
-                &[
-                    entry(0, wgpu::BindingResource::TextureView(&terrain.texture)),
-                    entry(1, sampler.clone()),
-                    entry(2, terrain.vertices.as_entire_binding()),
-                    entry(3, chunks.as_entire_binding()),
-                ],
-            )
-        });
+        let terrain = buffers.terrain.as_ref().map(|_| TerrainSlot::new(gpu));
         let mesh_groups = buffers.meshes.iter().zip(0_u64..).map(|(mesh, i)| {
             let placement = wgpu::BufferBinding { buffer: &placements, offset: i * PLACEMENT_STRIDE, size: wgpu::BufferSize::new(16) };
             group(
@@ -274,14 +268,14 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, chunks, indices, kept, placements, camera_group, terrain_group, mesh_groups }
+        IdealSlot { camera, terrain, placements, camera_group, mesh_groups }
     }
 
     /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
     /// of detail that the terrain got in the middle one.
     ///
     /// # Errors
-    /// Faults of the shader files.
+    /// Faults of the shader files; [`GpuError::TooLarge`] for triangles that no buffer holds.
     pub fn encode(
         &mut self,
         gpu: &GpuContext,
@@ -290,9 +284,9 @@ impl IdealPass {
         scene: &Scene,
         buffers: &SceneBuffers,
         plan: &FramePlan,
-        meshes: &[TerrainMesh],
+        meshes: &[PlacedMesh],
         target: &IdealTarget,
-    ) -> Result<LodSelection, ComposeError> {
+    ) -> Result<LodSelection, RenderErrorBase> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
@@ -308,12 +302,13 @@ impl IdealPass {
         let mut middle_lod = LodSelection::default();
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
-            let base_ned_m = key.pose.position_ned_m.round();
+            let base_ned_m = base_ned_m(&key.pose);
             recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
             let mut lod = LodSelection::default();
             let mut indices = 0;
-            if let (Some(terrain), Some(mesh)) = (&scene.terrain, meshes.get(k)) {
-                indices = place_terrain(gpu, recorder, slot, terrain, mesh, base_ned_m);
+            if let (Some(terrain), Some(on_device), Some(mesh)) = (&mut slot.terrain, &buffers.terrain, meshes.get(k)) {
+                indices = place_terrain(gpu, recorder, terrain, mesh)?;
+                terrain.bind(gpu, recorder, &self.terrain_layout, on_device, &buffers.sampler);
                 lod = mesh.lod;
             }
             index_counts.push(indices);
@@ -374,6 +369,11 @@ impl IdealPass {
     }
 }
 
+/// What surfaces stand relative to when seen from a camera: in whole metres, so that sums with whole chunk centres are exact.
+pub(crate) fn base_ned_m(pose: &CameraPose) -> DVec3 {
+    pose.position_ned_m.round()
+}
+
 /// Linear colour, cleared to the sky's.
 fn color_attachment<'a>(view: &'a wgpu::TextureView, scene: &Scene) -> wgpu::RenderPassColorAttachment<'a> {
     let [r, g, b] = scene.sky_linear.map(f64::from);
@@ -423,11 +423,11 @@ fn buffer_entry(binding: u32, visibility: wgpu::ShaderStages, ty: wgpu::BufferBi
     wgpu::BindGroupLayoutEntry { binding, visibility, ty, count: None }
 }
 
-fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
+fn texture_entries(view_dimension: wgpu::TextureViewDimension) -> [wgpu::BindGroupLayoutEntry; 2] {
     let visibility = wgpu::ShaderStages::FRAGMENT;
     let texture = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
+        view_dimension,
         multisampled: false,
     };
     let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
@@ -440,13 +440,13 @@ fn texture_entries() -> [wgpu::BindGroupLayoutEntry; 2] {
 fn pipeline(
     gpu: &GpuContext,
     file: &str,
-    slot: Slot,
+    slots: &[Slot],
     layouts: &[&wgpu::BindGroupLayout],
     buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
     samples: u32,
     color: Option<wgpu::TextureFormat>,
 ) -> Result<wgpu::RenderPipeline, ComposeError> {
-    let module = shaders::module(&gpu.device, file, file, &[slot])?;
+    let module = shaders::module(&gpu.device, file, file, slots)?;
     let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(file),

@@ -81,15 +81,6 @@ pub struct KeyLayout {
     pub pad2: u32,
 }
 
-/// Mirror of `ChunkPlace` in shaders/ideal/terrain.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[expect(missing_docs, reason = "documented in the shader, field by field")]
-pub struct ChunkPlace {
-    pub centre_from_base_m: [f32; 3],
-    pub first_vertex: u32,
-}
-
 /// Mirror of `Truth` in shaders/reverse/emit/truth.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -178,8 +169,13 @@ mod tests {
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
-        let module =
-            parse(shaders::compose("ideal/terrain.wgsl", &[crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid)]).unwrap());
+        let module = parse(
+            shaders::compose(
+                "ideal/terrain.wgsl",
+                &[crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(true)],
+            )
+            .unwrap(),
+        );
         assert_mirror!(
             &module,
             "IdealCamera",
@@ -198,7 +194,6 @@ mod tests {
                 pad2,
             ]
         );
-        assert_mirror!(&module, "ChunkPlace", ChunkPlace, [centre_from_base_m, first_vertex]);
         let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
         assert_mirror!(&module, "KeyLayout", KeyLayout, [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]);
     }

@@ -12,6 +12,8 @@ pub mod shaders;
 
 pub mod layout;
 
+/// Tiles of large pictures.
+pub mod tiles;
 pub mod upload;
 
 pub mod staging;

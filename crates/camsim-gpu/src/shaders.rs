@@ -25,6 +25,8 @@ embedded![
     "ideal/marks.wgsl",
     "ideal/mesh.wgsl",
     "ideal/near_marks.wgsl",
+    "ideal/picture/tiles.wgsl",
+    "ideal/picture/whole.wgsl",
     "ideal/reach.wgsl",
     "ideal/reads/four.wgsl",
     "ideal/reads/grid.wgsl",

@@ -1,10 +1,13 @@
 //! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
 
-use camsim_core::scene::{Encoding, Mesh, Scene, Terrain, Texture, Wrap};
+use camsim_core::scene::{Encoding, Mesh, Scene, Terrain, Texture, Wrap, is_whole};
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
-use crate::context::{GpuContext, GpuError};
+use crate::{
+    context::{GpuContext, GpuError},
+    tiles::TilePool,
+};
 
 /// A scene's device resources.
 #[derive(Debug)]
@@ -17,13 +20,20 @@ pub struct SceneBuffers {
     pub sampler: wgpu::Sampler,
 }
 
-/// A terrain on the device; which triangles of it are drawn is found frame by frame.
+/// A terrain on the device, without its triangles: each frame brings those that it draws.
 #[derive(Debug)]
 pub struct TerrainBuffers {
-    /// Five floats a vertex.
-    pub vertices: wgpu::Buffer,
-    /// Picture on the ground.
-    pub texture: wgpu::TextureView,
+    /// On the ground.
+    pub picture: GroundPicture,
+}
+
+/// The picture on the ground.
+#[derive(Debug)]
+pub enum GroundPicture {
+    /// In one texture.
+    Whole(wgpu::TextureView),
+    /// Too large for one.
+    Tiles(Box<TilePool>),
 }
 
 /// One mesh.
@@ -56,6 +66,24 @@ impl SceneBuffers {
     }
 }
 
+impl SceneBuffers {
+    /// The tiles of the ground's picture, if it is not whole.
+    pub(crate) fn tiles(&self) -> Option<&TilePool> {
+        self.terrain.as_ref().and_then(|terrain| match &terrain.picture {
+            GroundPicture::Tiles(tiles) => Some(&**tiles),
+            GroundPicture::Whole(_) => None,
+        })
+    }
+
+    /// As [`SceneBuffers::tiles`].
+    pub(crate) fn tiles_mut(&mut self) -> Option<&mut TilePool> {
+        self.terrain.as_mut().and_then(|terrain| match &mut terrain.picture {
+            GroundPicture::Tiles(tiles) => Some(&mut **tiles),
+            GroundPicture::Whole(_) => None,
+        })
+    }
+}
+
 fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
     let address = match wrap {
         Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
@@ -73,15 +101,11 @@ fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
 }
 
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
-    let texture = upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?;
-    let floats: Vec<f32> = terrain.vertices.iter().flat_map(|v| [v.offset_m[0], v.offset_m[1], v.offset_m[2], v.uv[0], v.uv[1]]).collect();
-    gpu.check_storage("the terrain's vertices", 4 * floats.len() as u64, "use a smaller or coarser DEM in scene.terrain.dem")?;
-    let vertices = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("camsim.terrain.vertices"),
-        contents: bytemuck::cast_slice(&floats),
-        usage: wgpu::BufferUsages::STORAGE,
-    });
-    Ok(TerrainBuffers { vertices, texture })
+    let picture = match is_whole(terrain.texture.size_px, gpu.max_picture_px) {
+        true => GroundPicture::Whole(upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?),
+        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain))),
+    };
+    Ok(TerrainBuffers { picture })
 }
 
 fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {

@@ -8,7 +8,7 @@ use camsim_core::{
 };
 use image::{DynamicImage, ImageReader};
 
-use crate::terrain::raster::{Raster, is_tiff};
+use crate::terrain::raster::{Raster, is_tiff, most_decoded};
 
 /// Why a picture cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -87,10 +87,16 @@ fn luma([r, g, b]: [f32; 3]) -> f32 {
 }
 
 fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| PictureError::open(path, source))?;
+    let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
+    let mut reader =
+        ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| PictureError::open(path, source))?;
     if reader.format().is_none() {
         return Err(PictureError::decode(path, "not a PNG, JPEG, GIF, BMP or TIFF file"));
     }
+    // By itself it would stop at 512 MiB, however large the file.
+    let mut limits = image::Limits::default();
+    limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes)));
+    reader.limits(limits);
     let picture = reader.decode().map_err(|error| PictureError::decode(path, error.to_string()))?;
     if picture.width() == 0 || picture.height() == 0 {
         return Err(PictureError::decode(path, "the picture has no pixel"));

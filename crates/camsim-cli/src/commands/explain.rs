@@ -3,7 +3,7 @@
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, Solver},
-    scene::TerrainDetail,
+    scene::{self, GroundTiles, TILE_BYTES, TerrainDetail},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
@@ -43,6 +43,7 @@ struct Explained<'a> {
     warnings: &'a [String],
     plan: PlanSummary<'a>,
     level_of_detail: Option<LevelOfDetail>,
+    memory: Option<Memory>,
 }
 
 #[derive(Serialize)]
@@ -69,6 +70,21 @@ pub(super) struct LevelOfDetail {
     /// Bound on how far the drawn terrain is from the full one, px of the ideal frame.
     pub(super) max_error_px: f64,
     pub(super) tolerance_px: f64,
+    /// What the device holds of its triangles.
+    pub(super) triangle_bytes: u64,
+}
+
+/// Memory for a terrain and its picture, bytes. Only what is in sight of a frame is on the device, but for a picture that is held whole.
+#[derive(Serialize)]
+struct Memory {
+    /// On the host: heights with what the level of detail needs.
+    heights_on_host: u64,
+    /// On the host: the picture, with its smaller versions if it is in tiles.
+    picture_on_host: u64,
+    /// On the device: the picture, whole or as many tiles as this frame may read.
+    picture_on_device: u64,
+    /// For a picture in tiles: those that this frame may read, and all.
+    tiles: Option<[u64; 2]>,
 }
 
 #[derive(Serialize)]
@@ -99,11 +115,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
+    let memory = memory(&loaded.sequence, &plan);
     let tracked = &loaded.tracked;
     let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
         let warnings = &loaded.warnings;
-        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings, plan: plan.summary(), level_of_detail })?);
+        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings, plan: plan.summary(), level_of_detail, memory })?);
     }
     let [first_s, last_s] = log.span_s;
     console.line(format_args!("log {}", log.file))?;
@@ -118,11 +135,14 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
-    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px }) = level_of_detail {
+    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {
         console.line("terrain in this frame")?;
         console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;
         if away > 0 {
             console.line(format_args!("  {away} more face away and are not drawn: from above they are hidden"))?;
+        }
+        if let Some(memory) = memory {
+            print_memory(&memory, triangle_bytes, console)?;
         }
     }
     Ok(())
@@ -132,9 +152,40 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let tolerance_px = plan.terrain_error_px;
-    let detail = TerrainDetail::new(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), tolerance_px);
-    let lod = detail.mesh_to_draw().lod;
-    Some(LevelOfDetail { triangles: lod.triangles, away: lod.away, max_error_px: lod.max_error_px, tolerance_px })
+    let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.key_pose.position_ned_m.round());
+    let (lod, triangle_bytes) = (placed.lod, placed.bytes());
+    Some(LevelOfDetail { triangles: lod.triangles, away: lod.away, max_error_px: lod.max_error_px, tolerance_px, triangle_bytes })
+}
+
+fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a> {
+    TerrainDetail::new(terrain, &plan.key_pose, plan.tangents(), plan.ideal.focal_px.max_element(), plan.terrain_error_px)
+}
+
+fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
+    let terrain = sequence.scene.terrain.as_ref()?;
+    let picture = terrain.texture.rgba8.len() as u64;
+    let heights_on_host = terrain.host_bytes();
+    if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
+        return Some(Memory { heights_on_host, picture_on_host: picture, picture_on_device: 4 * picture / 3, tiles: None });
+    }
+    let ground = GroundTiles::new(terrain);
+    let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
+    let all = u64::from(ground.grid.count);
+    Some(Memory { heights_on_host, picture_on_host: 4 * picture / 3, picture_on_device: tiles * TILE_BYTES, tiles: Some([tiles, all]) })
+}
+
+fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
+    let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let (heights, picture) = (mib(memory.heights_on_host), mib(memory.picture_on_host));
+    console.line(format_args!("  host: {heights:.1} MiB of heights, {picture:.1} MiB of picture"))?;
+    let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
+    match memory.tiles {
+        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB"))?,
+        Some([tiles, all]) => console.line(format_args!(
+            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 16 MiB)"
+        ))?,
+    }
+    Ok(())
 }
 
 fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Failure> {

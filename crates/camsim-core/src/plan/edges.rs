@@ -11,7 +11,7 @@ use super::{BlurStage, Contours, FramePlan, SIZE_QUANTUM_PX, Skip};
 use crate::{
     pose::CameraPose,
     scenario::{QualitySpec, Silhouettes},
-    scene::{Aabb, Mesh, Scene, Terrain, terrain::Frustum},
+    scene::{Aabb, CHUNK_CELLS, Mesh, Scene, Terrain, terrain::Frustum},
 };
 
 /// Cells along the side of a block that shares one slope bound.
@@ -80,9 +80,7 @@ pub(super) fn scale_of(edges: EdgeStage) -> u32 {
 /// Slopes and borders of a scene, found once.
 #[derive(Debug, Default)]
 pub(super) struct SceneOutline {
-    chunks: Vec<Patch>,
-    /// Blocks of each chunk.
-    blocks: Vec<Vec<Patch>>,
+    terrain: PatchTree,
     meshes: Vec<MeshOutline>,
 }
 
@@ -105,12 +103,9 @@ struct MeshOutline {
 
 impl SceneOutline {
     pub(super) fn new(scene: &Scene) -> Self {
-        let blocks: Vec<Vec<Patch>> = scene.terrain.as_ref().map_or_else(Vec::new, |terrain| {
-            (0..terrain.chunks.len() as u32).into_par_iter().map(|chunk| chunk_blocks(terrain, chunk)).collect()
-        });
-        let chunks = blocks.iter().map(|blocks| blocks.iter().copied().fold(Patch::EMPTY, Patch::join)).collect();
+        let terrain = scene.terrain.as_ref().map_or_else(PatchTree::default, PatchTree::new);
         let meshes = scene.meshes.iter().map(|mesh| MeshOutline { bounds: mesh_bounds(mesh), flat_convex: is_flat_convex(mesh) }).collect();
-        Self { chunks, blocks, meshes }
+        Self { terrain, meshes }
     }
 
     /// Whether any mesh can be seen from within `travel_m` of `pose`.
@@ -123,15 +118,12 @@ impl SceneOutline {
     /// `None` and the reason if no silhouette can be seen from within `travel_m` of `pose` through `tangents` (u_min, u_max, v_min, v_max).
     pub(super) fn reason_for_none(&self, scene: &Scene, pose: &CameraPose, tangents: [f64; 4], travel_m: f64) -> Option<String> {
         let frustum = Frustum::new(pose, tangents);
-        let terrain = self.chunks.iter().any(|patch| frustum.may_see(&patch.bounds));
+        let terrain = self.terrain.any(CHUNK_LEVEL, &|patch| frustum.may_see(&patch.bounds));
         let mut meshes = self.meshes.iter().zip(&scene.meshes).filter(|(outline, _)| frustum.may_see(&outline.bounds));
         match (terrain, meshes.next(), meshes.next()) {
             (false, None, _) => Some("nothing but sky is in view".into()),
             (true, None, _) => {
-                let edge = self.chunks.iter().zip(&self.blocks).any(|(chunk, blocks)| {
-                    may_end_or_turn(&frustum, chunk, pose, travel_m)
-                        && blocks.iter().any(|block| may_end_or_turn(&frustum, block, pose, travel_m))
-                });
+                let edge = self.terrain.any(0, &|patch| may_end_or_turn(&frustum, patch, pose, travel_m));
                 (!edge).then(|| "the terrain fills the view and no slope in it can be seen edge-on".into())
             }
             (false, Some((outline, mesh)), None) => {
@@ -215,29 +207,80 @@ impl Patch {
     }
 }
 
-fn chunk_blocks(terrain: &Terrain, chunk: u32) -> Vec<Patch> {
-    let [columns, rows] = terrain.chunks[chunk as usize].cells;
-    let [chunk_column, chunk_row] = [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]];
-    let at_rim = |i: u32, j: u32| {
-        let (west, north) = (chunk_column == 0 && i == 0, chunk_row == 0 && j == 0);
-        let east = chunk_column + 1 == terrain.chunk_grid[0] && i + 1 == columns;
-        let south = chunk_row + 1 == terrain.chunk_grid[1] && j + 1 == rows;
-        west || north || east || south
-    };
-    let mut blocks = Vec::new();
-    for j0 in (0..rows).step_by(BLOCK_CELLS as usize) {
-        for i0 in (0..columns).step_by(BLOCK_CELLS as usize) {
-            let mut block = Patch::EMPTY;
-            for j in j0..(j0 + BLOCK_CELLS).min(rows) {
-                for i in i0..(i0 + BLOCK_CELLS).min(columns) {
-                    let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| terrain.position_ned_m(chunk, i + a, j + b));
-                    block = block.join(cell(corners, at_rim(i, j)));
+/// Patches of 8x8 cells, and above them patches of 2x2 of the level below, up to one: a question that no patch answers with yes unless all those
+/// around it do is asked where it may be answered so.
+#[derive(Debug, Default)]
+struct PatchTree {
+    levels: Vec<PatchLevel>,
+}
+
+#[derive(Debug)]
+struct PatchLevel {
+    /// Patches from west to east and from north to south.
+    size: [u32; 2],
+    patches: Vec<Patch>,
+}
+
+/// Level of the patches that are chunks.
+const CHUNK_LEVEL: usize = (CHUNK_CELLS / BLOCK_CELLS).trailing_zeros() as usize;
+
+impl PatchTree {
+    fn new(terrain: &Terrain) -> Self {
+        let size = terrain.cells.map(|cells| cells.div_ceil(BLOCK_CELLS));
+        let patches = (0..size[0] * size[1]).into_par_iter().map(|i| block(terrain, [i % size[0], i / size[0]])).collect();
+        let mut levels = vec![PatchLevel { size, patches }];
+        while let Some(below) = levels.last().filter(|level| level.size != [1, 1]) {
+            let size = below.size.map(|n| n.div_ceil(2));
+            let joined = |i: u32| below.children([i % size[0], i / size[0]]).map(|at| below.get(at)).fold(Patch::EMPTY, Patch::join);
+            let patches = (0..size[0] * size[1]).map(joined).collect();
+            levels.push(PatchLevel { size, patches });
+        }
+        Self { levels }
+    }
+
+    /// Whether `holds` for a patch of the level (or the last one) and for all those around it.
+    fn any(&self, level: usize, holds: &dyn Fn(&Patch) -> bool) -> bool {
+        let Some(last) = self.levels.len().checked_sub(1) else { return false };
+        let mut stack = vec![(last, [0, 0])];
+        while let Some((at_level, at)) = stack.pop() {
+            if holds(&self.levels[at_level].get(at)) {
+                match at_level.checked_sub(1) {
+                    Some(below) if at_level > level => stack.extend(self.levels[below].children(at).map(|at| (below, at))),
+                    _ => return true,
                 }
             }
-            blocks.push(block);
+        }
+        false
+    }
+}
+
+impl PatchLevel {
+    fn get(&self, [column, row]: [u32; 2]) -> Patch {
+        self.patches[(row * self.size[0] + column) as usize]
+    }
+
+    /// Patches of this level within one of the next.
+    fn children(&self, [column, row]: [u32; 2]) -> impl Iterator<Item = [u32; 2]> {
+        let [columns, rows] = self.size;
+        let four = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[i, j]| [2 * column + i, 2 * row + j]);
+        four.into_iter().filter(move |at| at[0] < columns && at[1] < rows)
+    }
+}
+
+/// The patch of 8x8 cells in a column and row of such.
+fn block(terrain: &Terrain, at: [u32; 2]) -> Patch {
+    let [west, north] = at.map(|n| n * BLOCK_CELLS);
+    let [columns, rows] = terrain.cells;
+    let mut block = Patch::EMPTY;
+    for row in north..(north + BLOCK_CELLS).min(rows) {
+        for column in west..(west + BLOCK_CELLS).min(columns) {
+            let (chunk, [i, j]) = terrain.chunk_of_cell([column, row]);
+            let corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| terrain.position_ned_m(chunk, i + a, j + b));
+            let at_rim = column == 0 || row == 0 || column + 1 == columns || row + 1 == rows;
+            block = block.join(cell(corners, at_rim));
         }
     }
-    blocks
+    block
 }
 
 /// Both ways of cutting the cell into triangles: the terrain's own is one of them.
@@ -354,6 +397,27 @@ mod tests {
         assert!(none(&hills(20.0), &pose(400.0, 80.0)));
         // Below the surface's top: nothing is known.
         assert!(!none(&hills(20.0), &pose(5.0, -90.0)));
+    }
+
+    #[test]
+    fn the_tree_answers_as_all_its_blocks_do() {
+        let heights: Vec<f64> =
+            (0..300 * 200).map(|i| 60.0 * (f64::from(i % 300) * 0.09).sin() * (f64::from(i / 300) * 0.05).cos()).collect();
+        let scene = Scene { terrain: Some(Terrain::from_heights(300, 200, 20.0, &heights, None).unwrap()), ..Scene::default() };
+        let outline = SceneOutline::new(&scene);
+        let blocks = &outline.terrain.levels[0];
+        assert_eq!((blocks.size, outline.terrain.levels.len()), ([38, 25], 7));
+        let (mut edges, mut none) = (0, 0);
+        for i in 0..400_u32 {
+            let [x, y, height, pitch] = crate::noise::pcg4d([i, 7, 0, 0]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
+            let mut pose = pose(100.0 + 1500.0 * height, -90.0 + 60.0 * pitch);
+            pose.position_ned_m += DVec3::new(3000.0 * (x - 0.5), 4000.0 * (y - 0.5), 0.0);
+            let frustum = Frustum::new(&pose, VIEW);
+            let expected = blocks.patches.iter().any(|block| may_end_or_turn(&frustum, block, &pose, 1.0));
+            assert_eq!(outline.terrain.any(0, &|patch| may_end_or_turn(&frustum, patch, &pose, 1.0)), expected);
+            (edges, none) = if expected { (edges + 1, none) } else { (edges, none + 1) };
+        }
+        assert!(edges > 50 && none > 50, "{edges} {none}");
     }
 
     #[test]

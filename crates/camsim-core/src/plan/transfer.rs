@@ -88,7 +88,7 @@ impl Version {
 }
 
 /// The filter of the ideal frame's surfaces. Twin of `picture_at` in shaders/ideal/reads.
-pub(super) struct SurfaceFilter {
+pub(crate) struct SurfaceFilter {
     /// d(texel)/d(ideal px), and what takes a frequency from cycles an ideal pixel to cycles a texel.
     texel_from_ideal: DMat2,
     texel_cycles: DMat2,
@@ -130,6 +130,12 @@ impl SurfaceFilter {
             taps: [long_taps as u32, short_taps as u32],
             level,
         }
+    }
+
+    /// The version that is read, and the sides of the grid of reads, texels of the picture itself.
+    #[cfg(test)]
+    pub fn reads(&self) -> (f64, [DVec2; 2]) {
+        (self.level, self.sides)
     }
 
     /// What is left of a wave beyond what the texture itself has.

@@ -19,7 +19,9 @@ mod detail;
 mod drawn_tests;
 mod errors;
 mod facing;
+mod ground_tiles;
 mod lattice;
+mod placed;
 mod query;
 mod select;
 #[cfg(test)]
@@ -32,7 +34,11 @@ use glam::{DVec3, Vec3};
 pub use bounds::Aabb;
 use bounds::BlockTree;
 pub(in crate::scene) use bounds::inverse;
+pub use build::TerrainGrid;
 pub use detail::TerrainDetail;
+use facing::BorderPart;
+pub use ground_tiles::GroundTiles;
+pub use placed::PlacedMesh;
 pub(crate) use query::Frustum;
 pub use query::TerrainHit;
 pub(crate) use query::intersect_triangle;
@@ -90,6 +96,8 @@ pub struct Terrain {
     /// Box around everything.
     pub bounds: Aabb,
     tree: BlockTree,
+    /// The border, side after side.
+    border: Vec<BorderPart>,
     /// Errors of the hierarchies of all chunks ([`errors::PER_CHUNK`] each), with those of all that needs a vertex.
     errors: Vec<u16>,
     /// Largest horizontal deviation of what is judged by squares of each of [`lattice::NODE_CELLS`], metres: next to nothing but on grids that bend.
@@ -160,7 +168,7 @@ impl Terrain {
     }
 
     /// Number of chunk that holds cell (column, row) of the full grid, and the cell's place in that chunk.
-    fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
+    pub(crate) fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
         let [column, row] = cell.map(|n| n / CHUNK_CELLS);
         (row * self.chunk_grid[0] + column, cell.map(|n| n % CHUNK_CELLS))
     }

@@ -95,12 +95,19 @@ impl Texture {
     /// the picture in place. Colour is weighted by alpha: pixels without content do not darken their neighbours.
     pub fn mips(&self) -> Vec<MipLevel> {
         let mut levels = Vec::new();
-        let mut image = self.to_linear();
-        while image.size_px != [1, 1] {
-            image = image.half();
-            levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), rgba8: image.encode(self.encoding) });
+        if self.size_px == [1, 1] {
+            return levels;
         }
-        levels
+        let table = self.encoding.decode_table();
+        // The picture itself never stands there in floats: of a large one they would take four times its memory.
+        let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| linear(&table, &self.rgba8[4 * at..4 * at + 4]));
+        loop {
+            levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), rgba8: image.encode(self.encoding) });
+            if image.size_px == [1, 1] {
+                return levels;
+            }
+            image = image.half();
+        }
     }
 
     /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear sampling across the border of
@@ -125,24 +132,21 @@ impl Texture {
             }
         }
     }
+}
 
-    fn to_linear(&self) -> LinearImage {
-        let table = self.encoding.decode_table();
-        let premultiplied = self
-            .rgba8
-            .par_chunks_exact(4)
-            .map(|p| {
-                let alpha = f32::from(p[3]) / 255.0;
-                [table[p[0] as usize] * alpha, table[p[1] as usize] * alpha, table[p[2] as usize] * alpha, alpha]
-            })
-            .collect();
-        LinearImage { size_px: self.size_px.map(|n| n as usize), premultiplied }
-    }
+/// Linear light, premultiplied by alpha.
+fn linear(table: &[f32; 256], p: &[u8]) -> [f32; 4] {
+    let alpha = f32::from(p[3]) / 255.0;
+    [table[p[0] as usize] * alpha, table[p[1] as usize] * alpha, table[p[2] as usize] * alpha, alpha]
 }
 
 impl LinearImage {
     fn half(&self) -> Self {
-        let [width, height] = self.size_px;
+        Self::half_of(self.size_px, |at| self.premultiplied[at])
+    }
+
+    /// Half of a picture by its pixels, row after row.
+    fn half_of([width, height]: [usize; 2], pixel_at: impl Fn(usize) -> [f32; 4] + Sync) -> Self {
         let [to_width, to_height] = [(width / 2).max(1), (height / 2).max(1)];
         let columns: Vec<_> = (0..to_width).map(|x| cover(x, width, to_width)).collect();
         let mut premultiplied = vec![[0.0; 4]; to_width * to_height];
@@ -151,7 +155,7 @@ impl LinearImage {
             for (pixel, (x0, x_weights)) in row.iter_mut().zip(&columns) {
                 for (dy, wy) in y_weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
                     for (dx, wx) in x_weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-                        let source = self.premultiplied[(y0 + dy) * width + x0 + dx];
+                        let source = pixel_at((y0 + dy) * width + x0 + dx);
                         for (sum, value) in pixel.iter_mut().zip(source) {
                             *sum += wy * wx * value;
                         }

@@ -11,13 +11,14 @@ use std::{
 };
 
 use camsim_core::{
-    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, TemporalStage, line_poses, line_times},
+    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times},
     pose::CameraPose,
-    scene::{TerrainDetail, TerrainMesh},
+    scene::{GroundTiles, PlacedMesh, TerrainDetail},
     temporal::IdealGeometry,
 };
 
 use super::ms_since;
+use crate::ideal::base_ned_m;
 
 /// Frames that are prepared before they are asked for, at most. Each is some megabytes of triangles and poses.
 const MOST_AHEAD: usize = 4;
@@ -27,7 +28,7 @@ const MOST_AHEAD: usize = 4;
 pub(super) struct Prepared {
     pub plan: FramePlan,
     /// Triangles of the terrain for each key; none without a terrain.
-    pub meshes: Arc<[TerrainMesh]>,
+    pub meshes: Arc<[PlacedMesh]>,
     pub lines: Lines,
     pub plan_ms: f64,
 }
@@ -61,18 +62,21 @@ struct View {
     poses: Vec<CameraPose>,
     ideal: IdealGeometry,
     terrain_error_px: f64,
+    reads: SurfaceReads,
 }
 
 /// Prepares frames; the last triangles are kept for as long as they are seen in the same way.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
-    seen: Mutex<Option<(View, Arc<[TerrainMesh]>)>>,
+    /// Of the ground's picture, if it is in tiles.
+    tiles: Option<Arc<GroundTiles>>,
+    seen: Mutex<Option<(View, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
-    pub fn new(planner: Arc<Planner>) -> Self {
-        Self { planner, seen: Mutex::new(None) }
+    pub fn new(planner: Arc<Planner>, tiles: Option<Arc<GroundTiles>>) -> Self {
+        Self { planner, tiles, seen: Mutex::new(None) }
     }
 
     fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
@@ -83,9 +87,9 @@ impl Preparer {
         Ok(Prepared { plan, meshes, lines, plan_ms: ms_since(begun) })
     }
 
-    fn meshes(&self, plan: &FramePlan) -> Arc<[TerrainMesh]> {
+    fn meshes(&self, plan: &FramePlan) -> Arc<[PlacedMesh]> {
         let poses = plan.keys.iter().map(|key| key.pose).collect();
-        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px };
+        let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px, reads: plan.surface_reads };
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
         let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, meshes)) = seen().as_ref().filter(|(seen, _)| *seen == view) {
@@ -94,9 +98,13 @@ impl Preparer {
         let focal_px = plan.ideal.focal_px.max_element();
         let terrain = self.planner.sequence().scene.terrain.iter();
         let meshes = terrain.flat_map(|terrain| {
-            view.poses.iter().map(|pose| TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px).mesh_to_draw())
+            view.poses.iter().map(|pose| {
+                let detail = TerrainDetail::new(terrain, pose, plan.tangents(), focal_px, view.terrain_error_px);
+                let tiles = self.tiles.as_ref().map_or_else(Vec::new, |tiles| detail.tiles(tiles, view.reads));
+                PlacedMesh { tiles, ..detail.mesh_to_draw().placed(terrain, base_ned_m(pose)) }
+            })
         });
-        let meshes: Arc<[TerrainMesh]> = meshes.collect();
+        let meshes: Arc<[PlacedMesh]> = meshes.collect();
         *seen() = Some((view, meshes.clone()));
         meshes
     }

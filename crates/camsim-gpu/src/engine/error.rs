@@ -22,7 +22,7 @@ pub enum RenderError<E: std::error::Error + 'static> {
 }
 
 /// Errors before a sink is involved.
-pub(super) type RenderErrorBase = RenderError<std::convert::Infallible>;
+pub(crate) type RenderErrorBase = RenderError<std::convert::Infallible>;
 
 impl<E: std::error::Error + 'static> RenderError<E> {
     /// As the error of a sink of another kind.

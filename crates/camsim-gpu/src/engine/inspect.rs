@@ -41,8 +41,15 @@ impl Session<'_> {
     /// Device faults; `None` before the first frame.
     pub fn triangles_near_marks(&self) -> Result<Option<u64>, GpuError> {
         let Some(slot) = self.drawn.as_ref().and_then(|drawn| self.slots[drawn.slot].ideal.first()) else { return Ok(None) };
-        let arguments = read_buffer::<u32>(&self.engine.gpu, slot.near_marks())?;
+        let Some(near_marks) = slot.near_marks() else { return Ok(Some(0)) };
+        let arguments = read_buffer::<u32>(&self.engine.gpu, near_marks)?;
         self.engine.check()?;
         Ok(arguments.first().map(|&indices| u64::from(indices) / 3))
+    }
+
+    /// Tiles of the ground's picture that are on the device, and all that there are; `None` for a picture that is held whole.
+    #[must_use]
+    pub fn tiles_held(&self) -> Option<[usize; 2]> {
+        self.buffers.tiles().map(|tiles| [tiles.held().0, tiles.ground.grid.count as usize])
     }
 }

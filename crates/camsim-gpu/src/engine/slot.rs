@@ -45,7 +45,7 @@ impl Slot {
         });
         Self {
             staging: None,
-            ideal: vec![ideal_pass.slot(gpu, &sequence.scene, buffers)],
+            ideal: vec![ideal_pass.slot(gpu, buffers)],
             frame,
             poses: pose_buffer(gpu, 48 * width.max(height)),
             color: Output::new(gpu, "camsim.color", 16 * width * height),

@@ -102,8 +102,8 @@ impl NearMarksPass {
     ) {
         let keys: Vec<_> = (0..)
             .zip(slots.iter().zip(index_counts))
-            .filter(|(_, (slot, count))| slot.terrain_group.is_some() && **count > 0)
-            .map(|(k, (slot, &index_count))| {
+            .filter_map(|(k, (slot, &count))| slot.terrain.as_ref().filter(|_| count > 0).map(|terrain| (k, slot, terrain, count)))
+            .map(|(k, slot, terrain, index_count)| {
                 let layout = KeyLayout {
                     ideal_size_px: plan.ideal.size_px,
                     first_row: key_rows(&plan.ideal) * k,
@@ -111,20 +111,20 @@ impl NearMarksPass {
                     index_count,
                     ..KeyLayout::default()
                 };
-                recorder.write(&slot.kept.layout, 0, bytemuck::bytes_of(&layout));
-                recorder.write(&slot.kept.arguments, 0, bytemuck::cast_slice(&NONE_KEPT));
-                (slot, index_count)
+                recorder.write(&terrain.kept.layout, 0, bytemuck::bytes_of(&layout));
+                recorder.write(&terrain.kept.arguments, 0, bytemuck::cast_slice(&NONE_KEPT));
+                (slot, terrain, index_count)
             })
             .collect();
         let mut pass = recorder.compute_pass("near_marks");
         pass.set_pipeline(&self.pipeline);
         let tiles = fine.near_marks_group.get_or_init(|| self.bind(gpu, &self.tiles_layout, &[&fine.within_reach]));
-        for &(slot, index_count) in &keys {
-            let kept = &slot.kept;
-            let buffers = [&slot.indices, &kept.layout, &kept.arguments, &kept.indices];
+        for &(slot, terrain, index_count) in &keys {
+            let kept = &terrain.kept;
+            let buffers = [&terrain.indices, &kept.layout, &kept.arguments, &kept.indices];
             let group = kept.group.get_or_init(|| self.bind(gpu, &self.kept_layout, &buffers));
             pass.set_bind_group(0, &slot.camera_group, &[]);
-            pass.set_bind_group(1, slot.terrain_group.as_ref(), &[]);
+            pass.set_bind_group(1, terrain.group.as_ref(), &[]);
             pass.set_bind_group(2, tiles, &[]);
             pass.set_bind_group(3, group, &[]);
             let workgroups = (index_count / 3).div_ceil(WORKGROUP);

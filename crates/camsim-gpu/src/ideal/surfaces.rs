@@ -1,13 +1,18 @@
 //! What draws a key's surfaces: where they stand is written first, once for all passes that draw them.
 
-use camsim_core::scene::{Terrain, TerrainMesh};
+use camsim_core::scene::PlacedMesh;
 use glam::DVec3;
 
 use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines, near_marks::Kept};
-use crate::{context::GpuContext, layout::ChunkPlace, recorder::Recorder, upload::SceneBuffers};
+use crate::{
+    context::{GpuContext, GpuError},
+    recorder::Recorder,
+    tiles::TilePool,
+    upload::{GroundPicture, SceneBuffers, TerrainBuffers},
+};
 
-/// Room for the indices of a few thousand triangles, bytes.
-const MIN_INDEX_BYTES: u64 = 1 << 16;
+/// Room for a few thousand triangles, bytes.
+const MIN_BYTES: u64 = 1 << 16;
 
 /// Writes where the meshes stand from a key.
 pub(super) fn place_meshes(recorder: &mut Recorder<'_>, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
@@ -30,28 +35,94 @@ pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePi
     }
 }
 
-/// Writes where the chunks of a key stand and which triangles are drawn; returns the number of their indices.
+/// Vertices and triangles of a terrain that one ideal frame draws: no others are on the device. Buffers are replaced by larger ones when a
+/// frame has more than any before.
+#[derive(Debug)]
+pub(super) struct TerrainSlot {
+    vertices: wgpu::Buffer,
+    pub indices: wgpu::Buffer,
+    /// Those of the triangles that are near marks.
+    pub kept: Kept,
+    /// Where tiles of the picture are, and the state of theirs that it tells.
+    table: Option<(wgpu::Buffer, [u64; 2])>,
+    /// Picture and vertices.
+    pub group: Option<wgpu::BindGroup>,
+}
+
+impl TerrainSlot {
+    pub fn new(gpu: &GpuContext) -> Self {
+        let indices = index_buffer(gpu, 0);
+        let kept = Kept::new(gpu, indices.size());
+        Self { vertices: vertex_buffer(gpu, 0), indices, kept, table: None, group: None }
+    }
+
+    /// Makes what binds picture and vertices, if they are new, and writes where the picture's tiles are, if that has changed.
+    pub fn bind(
+        &mut self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        layout: &wgpu::BindGroupLayout,
+        terrain: &TerrainBuffers,
+        sampler: &wgpu::Sampler,
+    ) {
+        let view = match &terrain.picture {
+            GroundPicture::Whole(view) => Some(view),
+            GroundPicture::Tiles(tiles) => {
+                self.tell_tiles(gpu, recorder, tiles);
+                tiles.view()
+            }
+        };
+        let Some(view) = view else { return };
+        self.group.get_or_insert_with(|| {
+            let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+            let mut entries = vec![
+                entry(0, wgpu::BindingResource::TextureView(view)),
+                entry(1, wgpu::BindingResource::Sampler(sampler)),
+                entry(2, self.vertices.as_entire_binding()),
+            ];
+            entries.extend(self.table.as_ref().map(|(table, _)| entry(3, table.as_entire_binding())));
+            gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal.terrain"), layout, entries: &entries })
+        });
+    }
+
+    fn tell_tiles(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, tiles: &TilePool) {
+        let (table, told) =
+            self.table.get_or_insert_with(|| (create(gpu, "camsim.ideal.tiles", tiles.table_bytes(), wgpu::BufferUsages::STORAGE), [0; 2]));
+        let now = tiles.changes();
+        if *told != now {
+            tiles.write_table(recorder, table);
+        }
+        if told[1] != now[1] {
+            self.group = None;
+        }
+        *told = now;
+    }
+}
+
+const FEWER_TRIANGLES: &str = "allow larger quality.max_terrain_error_px, or use a coarser DEM in scene.terrain.dem";
+
+/// Writes the vertices and triangles of a key; returns the number of indices.
 pub(super) fn place_terrain(
     gpu: &GpuContext,
     recorder: &mut Recorder<'_>,
-    slot: &mut IdealSlot,
-    terrain: &Terrain,
-    mesh: &TerrainMesh,
-    base_ned_m: DVec3,
-) -> u32 {
-    let place = |&chunk: &u32| {
-        let chunk = &terrain.chunks[chunk as usize];
-        ChunkPlace { centre_from_base_m: (chunk.centre_ned_m - base_ned_m).as_vec3().to_array(), first_vertex: chunk.first_vertex }
-    };
-    let places: Vec<ChunkPlace> = mesh.chunks.iter().map(place).collect();
-    recorder.write(&slot.chunks, 0, bytemuck::cast_slice(&places));
-    let bytes: &[u8] = bytemuck::cast_slice(&mesh.indices);
-    if slot.indices.size() < bytes.len() as u64 {
-        slot.indices = index_buffer(gpu, bytes.len() as u64);
+    slot: &mut TerrainSlot,
+    mesh: &PlacedMesh,
+) -> Result<u32, GpuError> {
+    let (vertices, indices): (&[u8], &[u8]) = (bytemuck::cast_slice(&mesh.vertices), bytemuck::cast_slice(&mesh.indices));
+    for (bytes, what) in [(vertices, "the vertices of the terrain in one frame"), (indices, "the triangles of the terrain in one frame")] {
+        gpu.check_storage(what, room(bytes.len() as u64), FEWER_TRIANGLES)?;
+    }
+    if slot.vertices.size() < vertices.len() as u64 {
+        slot.vertices = vertex_buffer(gpu, vertices.len() as u64);
+        slot.group = None;
+    }
+    if slot.indices.size() < indices.len() as u64 {
+        slot.indices = index_buffer(gpu, indices.len() as u64);
         slot.kept = Kept::new(gpu, slot.indices.size());
     }
-    recorder.write(&slot.indices, 0, bytes);
-    mesh.indices.len() as u32
+    recorder.write(&slot.vertices, 0, vertices);
+    recorder.write(&slot.indices, 0, indices);
+    Ok(mesh.indices.len() as u32)
 }
 
 /// Which of a key's triangles are drawn.
@@ -65,28 +136,41 @@ pub(super) enum Triangles {
 
 /// Draws a terrain's triangles, all at once.
 pub(super) fn draw_terrain(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, triangles: Triangles) {
-    let Some(group) = slot.terrain_group.as_ref() else { return };
+    let Some(terrain) = slot.terrain.as_ref() else { return };
+    let Some(group) = terrain.group.as_ref() else { return };
     pass.set_pipeline(&pipelines.terrain);
     pass.set_bind_group(1, group, &[]);
     match triangles {
         Triangles::All(0) => {}
         Triangles::All(count) => {
-            pass.set_index_buffer(slot.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.set_index_buffer(terrain.indices.slice(..), wgpu::IndexFormat::Uint32);
             pass.draw_indexed(0..count, 0, 0..1);
         }
         Triangles::Kept => {
-            pass.set_index_buffer(slot.kept.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed_indirect(&slot.kept.arguments, 0);
+            pass.set_index_buffer(terrain.kept.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed_indirect(&terrain.kept.arguments, 0);
         }
     }
 }
 
-/// For at least so many bytes: a power of two, so that few frames need another.
-pub(super) fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+/// What a buffer for so many bytes takes: a power of two, so that few frames need another.
+fn room(bytes: u64) -> u64 {
+    bytes.next_power_of_two().max(MIN_BYTES)
+}
+
+fn vertex_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+    create(gpu, "camsim.ideal.vertices", bytes, wgpu::BufferUsages::STORAGE)
+}
+
+fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+    create(gpu, "camsim.ideal.indices", bytes, wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE)
+}
+
+fn create(gpu: &GpuContext, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.ideal.indices"),
-        size: bytes.next_power_of_two().max(MIN_INDEX_BYTES),
-        usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        label: Some(label),
+        size: room(bytes),
+        usage: usage | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }

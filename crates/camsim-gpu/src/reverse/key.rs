@@ -256,9 +256,12 @@ mod tests {
             let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER] };
             files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
-        let surfaces = ["ideal/terrain.wgsl", "ideal/mesh.wgsl"].into_iter().flat_map(|file| {
-            SurfaceReads::ALL
-                .map(|reads| (format!("{file} {reads:?}"), shaders::compose(file, &[crate::ideal::reads_slot(reads)]).unwrap()))
+        let surfaces = [("ideal/terrain.wgsl", false), ("ideal/terrain.wgsl", true), ("ideal/mesh.wgsl", false)];
+        let surfaces = surfaces.into_iter().flat_map(|(file, tiles)| {
+            SurfaceReads::ALL.map(|reads| {
+                let slots = [crate::ideal::reads_slot(reads), crate::ideal::picture_slot(tiles)];
+                (format!("{file} {reads:?} {tiles}"), shaders::compose(file, &slots).unwrap())
+            })
         });
         let marks = [false, true].map(|thin| {
             let slot = crate::ideal::spread_slot(thin);

@@ -25,6 +25,11 @@ const MAX_COMPRESSION: u64 = 2000;
 /// Small files may always decode to this, bytes.
 const MIN_LIMIT: u64 = 64 << 20;
 
+/// What a file of so many bytes may decode to, bytes: a few bytes must not ask for all memory.
+pub(crate) fn most_decoded(bytes: u64) -> u64 {
+    bytes.saturating_mul(MAX_COMPRESSION).max(MIN_LIMIT)
+}
+
 /// A decoded TIFF.
 pub(crate) struct Raster {
     pub size: [u32; 2],
@@ -72,7 +77,7 @@ impl Raster {
 
     fn decode(file: BufReader<File>, bytes: u64) -> Result<Self, String> {
         let mut limits = Limits::default();
-        limits.decoding_buffer_size = usize::try_from((bytes * MAX_COMPRESSION).max(MIN_LIMIT)).unwrap_or(usize::MAX);
+        limits.decoding_buffer_size = usize::try_from(most_decoded(bytes)).unwrap_or(usize::MAX);
         limits.intermediate_buffer_size = limits.decoding_buffer_size;
         // A large image in strips of one row has large lists of offsets.
         limits.ifd_value_size = 64 << 20;
@@ -106,25 +111,21 @@ impl Raster {
         self.bands
     }
 
-    /// The first band.
-    pub fn first_band(&self) -> Vec<f64> {
-        fn pick<T: Copy>(values: &[T], every: usize, count: usize, to_f64: impl Fn(T) -> f64) -> Vec<f64> {
-            values.iter().step_by(every).take(count).map(|&value| to_f64(value)).collect()
-        }
-        let count = self.pixels();
-        let every = if self.is_planar { 1 } else { self.bands };
+    /// A value of the first band.
+    pub fn value(&self, pixel: usize) -> f64 {
+        let at = if self.is_planar { pixel } else { pixel * self.bands };
         match &self.data {
-            DecodingResult::U8(v) => pick(v, every, count, f64::from),
-            DecodingResult::U16(v) => pick(v, every, count, f64::from),
-            DecodingResult::U32(v) => pick(v, every, count, f64::from),
-            DecodingResult::U64(v) => pick(v, every, count, |x| x as f64),
-            DecodingResult::F16(v) => pick(v, every, count, |x| x.to_f64()),
-            DecodingResult::F32(v) => pick(v, every, count, f64::from),
-            DecodingResult::F64(v) => pick(v, every, count, |x| x),
-            DecodingResult::I8(v) => pick(v, every, count, f64::from),
-            DecodingResult::I16(v) => pick(v, every, count, f64::from),
-            DecodingResult::I32(v) => pick(v, every, count, f64::from),
-            DecodingResult::I64(v) => pick(v, every, count, |x| x as f64),
+            DecodingResult::U8(v) => v[at].into(),
+            DecodingResult::U16(v) => v[at].into(),
+            DecodingResult::U32(v) => v[at].into(),
+            DecodingResult::U64(v) => v[at] as f64,
+            DecodingResult::F16(v) => v[at].to_f64(),
+            DecodingResult::F32(v) => v[at].into(),
+            DecodingResult::F64(v) => v[at],
+            DecodingResult::I8(v) => v[at].into(),
+            DecodingResult::I16(v) => v[at].into(),
+            DecodingResult::I32(v) => v[at].into(),
+            DecodingResult::I64(v) => v[at] as f64,
         }
     }
 
@@ -160,7 +161,7 @@ impl Raster {
                 DecodingResult::F16(_) | DecodingResult::F32(_) | DecodingResult::F64(_) => 1.0,
                 _ => return Err(PictureError::decode(path, "grey values must be 8 or 16 bit unsigned, or float")),
             };
-            let values: Vec<f32> = self.first_band().iter().map(|v| (v / scale).clamp(0.0, 1.0) as f32).collect();
+            let values: Vec<f32> = (0..self.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
             if values.iter().any(|v| v.is_nan()) {
                 return Err(PictureError::decode(path, "holds NaN"));
             }

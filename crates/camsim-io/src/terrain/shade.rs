@@ -2,6 +2,7 @@
 
 use camsim_core::scene::{Encoding, Texture};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Height tints from the lowest to the highest point, sRGB.
 const TINTS: [[f64; 3]; 5] =
@@ -10,33 +11,45 @@ const TINTS: [[f64; 3]; 5] =
 /// Light that reaches faces turned away from the sun.
 const AMBIENT: f64 = 0.35;
 
-/// One pixel a height; voids are transparent.
-pub(super) fn relief(size: [u32; 2], heights_m: &[f64], points_ned_m: &[DVec3]) -> Texture {
+/// Rows of a band, whose points are found together.
+const BAND_ROWS: usize = 32;
+
+/// One pixel a height; voids are transparent. `height_m` and `point_ned_m` by column and row.
+pub(super) fn relief(
+    size: [u32; 2],
+    [low, high]: [f64; 2],
+    height_m: &(dyn Fn([u32; 2]) -> f64 + Sync),
+    point_ned_m: &(dyn Fn([u32; 2]) -> DVec3 + Sync),
+) -> Texture {
     let [cols, rows] = size.map(|n| n as usize);
-    let (low, high) =
-        heights_m.iter().filter(|h| !h.is_nan()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &h| (low.min(h), high.max(h)));
     // Towards a sun in the north-west, 45 degrees up.
     let to_sun = DVec3::new(0.5, -0.5, -std::f64::consts::FRAC_1_SQRT_2);
     let mut rgba8 = vec![0; 4 * cols * rows];
-    for (index, pixel) in rgba8.chunks_exact_mut(4).enumerate() {
-        let height = heights_m[index];
-        if height.is_nan() {
-            continue;
+    rgba8.par_chunks_mut(4 * cols * BAND_ROWS).enumerate().for_each(|(band, pixels)| {
+        // With a row more on each side.
+        let first = (band * BAND_ROWS).saturating_sub(1);
+        let past = (band * BAND_ROWS + BAND_ROWS + 1).min(rows);
+        let points: Vec<DVec3> = (first..past).flat_map(|j| (0..cols).map(move |i| point_ned_m([i as u32, j as u32]))).collect();
+        let point = |i: usize, j: usize| points[(j - first) * cols + i];
+        for (index, pixel) in pixels.chunks_exact_mut(4).enumerate() {
+            let (i, j) = (index % cols, band * BAND_ROWS + index / cols);
+            let height = height_m([i as u32, j as u32]);
+            if height.is_nan() {
+                continue;
+            }
+            let eastwards = point((i + 1).min(cols - 1), j) - point(i.saturating_sub(1), j);
+            let southwards = point(i, (j + 1).min(rows - 1)) - point(i, j.saturating_sub(1));
+            // Beside a void there is no slope: then as level ground.
+            let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
+            let upwards = if normal.z > 0.0 { -normal } else { normal };
+            let light = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
+            let share = if high > low { (height - low) / (high - low) } else { 0.0 };
+            for (byte, tint) in pixel.iter_mut().zip(tint(share)) {
+                *byte = (tint * light).clamp(0.0, 255.0) as u8;
+            }
+            pixel[3] = 255;
         }
-        let (i, j) = (index % cols, index / cols);
-        let point = |i: usize, j: usize| points_ned_m[j * cols + i];
-        let eastwards = point((i + 1).min(cols - 1), j) - point(i.saturating_sub(1), j);
-        let southwards = point(i, (j + 1).min(rows - 1)) - point(i, j.saturating_sub(1));
-        // Beside a void there is no slope: then as level ground.
-        let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
-        let upwards = if normal.z > 0.0 { -normal } else { normal };
-        let light = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
-        let share = if high > low { (height - low) / (high - low) } else { 0.0 };
-        for (byte, tint) in pixel.iter_mut().zip(tint(share)) {
-            *byte = (tint * light).clamp(0.0, 255.0) as u8;
-        }
-        pixel[3] = 255;
-    }
+    });
     let mut texture = Texture { size_px: size, rgba8, encoding: Encoding::Srgb };
     texture.bleed_into_transparent();
     texture

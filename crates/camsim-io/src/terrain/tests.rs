@@ -1,7 +1,7 @@
 //! Small files made here, and the real ones of CAMSIM_DATA.
 #![allow(clippy::unwrap_used)]
 
-use std::fs;
+use std::{fs, path::Path};
 
 use camsim_core::{pose::CameraPose, scene::TerrainDetail};
 use glam::DQuat;
@@ -10,7 +10,7 @@ use tiff::{
     tags::Tag,
 };
 
-use super::*;
+use super::{crs::Crs, *};
 
 /// Exact WGS-84: geodetic -> ECEF -> tangent plane.
 fn frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> DVec3 + Sync {

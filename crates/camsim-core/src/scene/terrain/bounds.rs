@@ -117,6 +117,11 @@ impl BlockTree {
         Self { levels }
     }
 
+    /// Memory that its boxes take.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| size_of_val(&*level.boxes)).sum()
+    }
+
     /// The box around everything.
     pub fn root(&self) -> Node {
         Node { level: self.levels.len() - 1, at: [0, 0] }
@@ -135,16 +140,15 @@ impl BlockTree {
     }
 
     /// Visits the squares of so many cells along a side whose boxes, and those around them, are accepted.
-    pub fn visit(&self, cells: u32, accept: &dyn Fn(&Aabb) -> bool, found: &mut dyn FnMut([u32; 2], &Aabb)) {
+    pub fn visit(&self, cells: u32, accept: &dyn Fn(&Aabb) -> bool, found: &mut dyn FnMut([u32; 2])) {
         let level = Self::level_of(cells);
         let mut stack = vec![self.root()];
         while let Some(node) = stack.pop() {
-            let bounds = self.bounds(node);
-            if !accept(bounds) {
+            if !accept(self.bounds(node)) {
                 continue;
             }
             if node.level <= level {
-                found(node.at, bounds);
+                found(node.at);
             } else {
                 stack.extend(self.children(node));
             }

@@ -9,7 +9,8 @@ use super::{
     Aabb, CHUNK_CELLS, Terrain, TerrainChunk, TerrainError, TerrainVertex,
     bounds::{BLOCK_CELLS, BlockTree},
     cell_triangles,
-    errors::{self, ChunkErrors, ChunkGrid, chunk_errors},
+    errors::{self, ChunkGrid, chunk_errors},
+    lattice::NODE_CELLS,
     select::VERTEX_BITS,
 };
 use crate::scene::{Encoding, Texture};
@@ -20,17 +21,38 @@ const MAX_COORDINATE_M: f64 = 1e7;
 /// Finest grid of vertex positions: 2^-24 m, so that position / quantum stays exact in f64 up to [`MAX_COORDINATE_M`].
 const MIN_QUANTUM_EXPONENT: i32 = -24;
 
-/// Input of [`Terrain::new`], with `cols * rows` entries in each list.
-struct PointGrid<'a> {
+/// Chunks that tell how positions are rounded.
+const SOME_CHUNKS: usize = 16;
+
+/// Where the points of a grid lie. They are asked for chunk by chunk, some more than once, by several threads, and never kept: what computes them
+/// needs no memory for all of them.
+pub trait TerrainGrid: Sync {
+    /// NED position of the point in a column (from the west) and row (from the north), metres; not finite for a void.
+    fn point_ned_m(&self, at: [u32; 2]) -> DVec3;
+    /// Its texture coordinates.
+    fn uv(&self, at: [u32; 2]) -> [f32; 2];
+}
+
+/// Points in lists, row after row.
+struct Listed<'a> {
     cols: u32,
-    rows: u32,
     points: &'a [DVec3],
     uvs: &'a [[f32; 2]],
 }
 
-impl PointGrid<'_> {
-    fn index(&self, column: u32, row: u32) -> usize {
+impl Listed<'_> {
+    fn index(&self, [column, row]: [u32; 2]) -> usize {
         row as usize * self.cols as usize + column as usize
+    }
+}
+
+impl TerrainGrid for Listed<'_> {
+    fn point_ned_m(&self, at: [u32; 2]) -> DVec3 {
+        self.points[self.index(at)]
+    }
+
+    fn uv(&self, at: [u32; 2]) -> [f32; 2] {
+        self.uvs[self.index(at)]
     }
 }
 
@@ -43,6 +65,10 @@ struct Place {
 }
 
 impl Place {
+    fn count(&self) -> usize {
+        ((self.cells[0] + 1) * (self.cells[1] + 1)) as usize
+    }
+
     /// Vertices row after row.
     fn vertices(self) -> impl Iterator<Item = [u32; 2]> {
         let [x, y] = self.first_cell;
@@ -50,11 +76,12 @@ impl Place {
     }
 }
 
-/// What is computed for each chunk on its own.
+/// What is found for each chunk on its own, beside its vertices and errors.
 struct Part {
     chunk: TerrainChunk,
-    vertices: Vec<TerrainVertex>,
-    errors: ChunkErrors,
+    /// Box around its points before they are rounded.
+    bounds: Aabb,
+    horizontal_m: [f64; NODE_CELLS.len()],
     void_cells: u64,
 }
 
@@ -68,36 +95,72 @@ impl Terrain {
     ///
     /// [`TerrainError`] says what is wrong with the grid.
     pub fn new(cols: u32, rows: u32, points: &[DVec3], uvs: &[[f32; 2]], texture: Arc<Texture>) -> Result<Self, TerrainError> {
-        let grid = PointGrid { cols, rows, points, uvs };
-        check(&grid)?;
+        if cols < 2 || rows < 2 {
+            return Err(TerrainError::TooSmall { cols, rows });
+        }
+        let expected = u64::from(cols) * u64::from(rows);
+        if let Some(&got) = [points.len() as u64, uvs.len() as u64].iter().find(|&&n| n != expected) {
+            return Err(TerrainError::Length { cols, rows, expected, got });
+        }
+        Self::of_grid(cols, rows, &Listed { cols, points, uvs }, texture)
+    }
+
+    /// As [`Terrain::new`], of points that are computed when they are asked for: no memory is needed but the terrain's own
+    /// ([`Terrain::host_bytes`]).
+    ///
+    /// # Errors
+    ///
+    /// As [`Terrain::new`].
+    pub fn of_grid(cols: u32, rows: u32, grid: &dyn TerrainGrid, texture: Arc<Texture>) -> Result<Self, TerrainError> {
+        if cols < 2 || rows < 2 {
+            return Err(TerrainError::TooSmall { cols, rows });
+        }
         let cells = [cols - 1, rows - 1];
         let chunk_grid = cells.map(|n| n.div_ceil(CHUNK_CELLS));
         let places = places(cells, chunk_grid)?;
-        let boxes: Vec<Aabb> = places.par_iter().map(|place| box_of(&grid, place.vertices())).collect();
-        let quantum_m = quantum(&boxes);
-        let parts: Vec<Part> = places.par_iter().zip(&boxes).map(|(place, bounds)| part(&grid, *place, bounds, quantum_m)).collect();
+        let mut vertices = vec![TerrainVertex::default(); places.iter().map(Place::count).sum()];
+        let mut errors = vec![0; places.len() * errors::PER_CHUNK];
+        // Positions take long to compute. A few chunks nearly always tell how they are rounded; where another one is larger, it is done again.
+        let some = places.iter().step_by(places.len().div_ceil(SOME_CHUNKS)).map(|place| points_of(grid, *place).1);
+        let mut quantum_m = quantum(some);
+        let parts = loop {
+            let parts: Vec<Part> = places
+                .par_iter()
+                .zip(split(&mut vertices, &places).into_par_iter().zip(errors.par_chunks_exact_mut(errors::PER_CHUNK)))
+                .map(|(place, (vertices, errors))| part(grid, *place, quantum_m, vertices, errors))
+                .collect();
+            let exact_m = quantum(parts.iter().map(|part| part.bounds));
+            if exact_m == quantum_m {
+                break parts;
+            }
+            quantum_m = exact_m;
+        };
+        let farthest = |bounds: &Aabb| if bounds.is_empty() { 0.0 } else { bounds.min.abs().max(bounds.max.abs()).max_element() };
+        let distance_m = parts.iter().map(|part| farthest(&part.bounds)).fold(0.0, f64::max);
+        if distance_m > MAX_COORDINATE_M {
+            return Err(TerrainError::TooFar { distance_m });
+        }
 
         let mut terrain = Self {
-            vertices: Vec::with_capacity(parts.iter().map(|p| p.vertices.len()).sum()),
+            vertices,
             chunks: Vec::with_capacity(parts.len()),
             chunk_grid,
             cells,
-            errors: Vec::with_capacity(parts.iter().map(|p| p.errors.keys.len()).sum()),
+            errors,
             horizontal_m: Default::default(),
             void_cells: 0,
             texture,
             quantum_m,
             bounds: Aabb::EMPTY,
             tree: BlockTree::new([1, 1], vec![Aabb::EMPTY]),
+            border: Vec::new(),
         };
         for part in parts {
-            for (largest_m, part_m) in terrain.horizontal_m.iter_mut().zip(part.errors.horizontal_m) {
+            for (largest_m, part_m) in terrain.horizontal_m.iter_mut().zip(part.horizontal_m) {
                 *largest_m = largest_m.max(part_m);
             }
-            terrain.errors.extend(part.errors.keys);
             terrain.void_cells += part.void_cells;
             terrain.bounds = terrain.bounds.union(&part.chunk.bounds);
-            terrain.vertices.extend(part.vertices);
             terrain.chunks.push(part.chunk);
         }
         errors::saturate(&mut terrain.errors, chunk_grid);
@@ -105,7 +168,14 @@ impl Terrain {
             return Err(TerrainError::AllVoid);
         }
         terrain.tree = terrain.block_tree();
+        terrain.border = terrain.border_parts();
         Ok(terrain)
+    }
+
+    /// Memory that it takes without its picture, bytes: 20 a vertex, 3 for the errors of the hierarchy and 4 for boxes, or 27 a height.
+    pub fn host_bytes(&self) -> u64 {
+        let lists = size_of_val(&*self.vertices) + size_of_val(&*self.errors) + size_of_val(&*self.chunks) + size_of_val(&*self.border);
+        (lists + self.tree.bytes()) as u64
     }
 
     /// A flat-earth terrain about the origin: `heights` (metres, up; NaN = void) at square cells of `cell_m`, row after row from the
@@ -137,7 +207,7 @@ impl Terrain {
 
     fn block_tree(&self) -> BlockTree {
         let size = self.cells.map(|n| n.div_ceil(BLOCK_CELLS));
-        let boxes = (0..size[0] * size[1])
+        let boxes: Vec<Aabb> = (0..size[0] * size[1])
             .into_par_iter()
             .map(|index| {
                 let first = [index % size[0] * BLOCK_CELLS, index / size[0] * BLOCK_CELLS];
@@ -159,23 +229,6 @@ impl Terrain {
     }
 }
 
-fn check(grid: &PointGrid<'_>) -> Result<(), TerrainError> {
-    let &PointGrid { cols, rows, points, uvs } = grid;
-    if cols < 2 || rows < 2 {
-        return Err(TerrainError::TooSmall { cols, rows });
-    }
-    let expected = u64::from(cols) * u64::from(rows);
-    if let Some(&got) = [points.len() as u64, uvs.len() as u64].iter().find(|&&n| n != expected) {
-        return Err(TerrainError::Length { cols, rows, expected, got });
-    }
-    let farthest = |point: &DVec3| if point.is_finite() { point.abs().max_element() } else { 0.0 };
-    let distance_m = points.par_iter().map(farthest).reduce(|| 0.0, f64::max);
-    if distance_m > MAX_COORDINATE_M {
-        return Err(TerrainError::TooFar { distance_m });
-    }
-    Ok(())
-}
-
 fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainError> {
     let [cols, rows] = cells.map(|n| n + 1);
     if u64::from(chunk_grid[0]) * u64::from(chunk_grid[1]) > 1 << (u32::BITS - VERTEX_BITS) {
@@ -195,15 +248,22 @@ fn places(cells: [u32; 2], chunk_grid: [u32; 2]) -> Result<Vec<Place>, TerrainEr
     Ok(places)
 }
 
-fn box_of(grid: &PointGrid<'_>, vertices: impl Iterator<Item = [u32; 2]>) -> Aabb {
+/// The vertices of each chunk, to be written.
+fn split<'a>(mut vertices: &'a mut [TerrainVertex], places: &[Place]) -> Vec<&'a mut [TerrainVertex]> {
+    let first = |place: &Place| {
+        let (own, rest) = std::mem::take(&mut vertices).split_at_mut(place.count());
+        vertices = rest;
+        own
+    };
+    places.iter().map(first).collect()
+}
+
+/// Positions of a chunk's vertices, and a box around them.
+fn points_of(grid: &dyn TerrainGrid, place: Place) -> (Vec<DVec3>, Aabb) {
+    let points: Vec<DVec3> = place.vertices().map(|at| grid.point_ned_m(at)).collect();
     let mut bounds = Aabb::EMPTY;
-    for [column, row] in vertices {
-        let point = grid.points[grid.index(column, row)];
-        if point.is_finite() {
-            bounds.include(point);
-        }
-    }
-    bounds
+    points.iter().filter(|point| point.is_finite()).for_each(|&point| bounds.include(point));
+    (points, bounds)
 }
 
 fn chunk_centre(bounds: &Aabb) -> DVec3 {
@@ -211,39 +271,34 @@ fn chunk_centre(bounds: &Aabb) -> DVec3 {
 }
 
 /// The power of two of which offsets are multiples: the largest offset of all chunks still fits 24 bits.
-fn quantum(boxes: &[Aabb]) -> f64 {
+fn quantum(boxes: impl Iterator<Item = Aabb>) -> f64 {
     let largest = boxes
-        .iter()
         .filter(|bounds| !bounds.is_empty())
         .map(|bounds| {
-            let centre = chunk_centre(bounds);
+            let centre = chunk_centre(&bounds);
             (bounds.max - centre).abs().max((bounds.min - centre).abs()).max_element()
         })
         .fold(1.0, f64::max);
     2f64.powi((largest.log2().ceil() as i32 - 23).max(MIN_QUANTUM_EXPONENT))
 }
 
-fn part(grid: &PointGrid<'_>, place: Place, bounds: &Aabb, quantum_m: f64) -> Part {
-    let centre_ned_m = chunk_centre(bounds);
+fn part(grid: &dyn TerrainGrid, place: Place, quantum_m: f64, vertices: &mut [TerrainVertex], errors: &mut [u16]) -> Part {
+    let (points, bounds) = points_of(grid, place);
+    let centre_ned_m = chunk_centre(&bounds);
     let mut exact_bounds = Aabb::EMPTY;
-    let vertices: Vec<TerrainVertex> = place
-        .vertices()
-        .map(|[column, row]| {
-            let index = grid.index(column, row);
-            let point = grid.points[index];
-            let offset_m = if point.is_finite() {
-                // Rounding the position, not the offset, is what makes chunks agree on shared vertices. Both steps are exact in f64.
-                let rounded = (point / quantum_m).round() * quantum_m;
-                exact_bounds.include(rounded);
-                (rounded - centre_ned_m).as_vec3().to_array()
-            } else {
-                [f32::NAN; 3]
-            };
-            TerrainVertex { offset_m, uv: grid.uvs[index] }
-        })
-        .collect();
+    for ((vertex, point), at) in vertices.iter_mut().zip(points).zip(place.vertices()) {
+        let offset_m = if point.is_finite() {
+            // Rounding the position, not the offset, is what makes chunks agree on shared vertices. Both steps are exact in f64.
+            let rounded = (point / quantum_m).round() * quantum_m;
+            exact_bounds.include(rounded);
+            (rounded - centre_ned_m).as_vec3().to_array()
+        } else {
+            [f32::NAN; 3]
+        };
+        *vertex = TerrainVertex { offset_m, uv: grid.uv(at) };
+    }
 
-    let (triangles, void_cells) = count_without_voids(place.cells, &vertices);
+    let (triangles, void_cells) = count_without_voids(place.cells, vertices);
     let chunk = TerrainChunk {
         centre_ned_m,
         bounds: exact_bounds,
@@ -252,8 +307,9 @@ fn part(grid: &PointGrid<'_>, place: Place, bounds: &Aabb, quantum_m: f64) -> Pa
         has_surface: triangles > 0,
         has_voids: vertices.iter().any(|vertex| vertex.offset_m[0].is_nan()),
     };
-    let errors = chunk_errors(&ChunkGrid { cells: place.cells, vertices: &vertices });
-    Part { chunk, vertices, errors, void_cells }
+    let found = chunk_errors(&ChunkGrid { cells: place.cells, vertices });
+    errors.copy_from_slice(&found.keys);
+    Part { chunk, bounds, horizontal_m: found.horizontal_m, void_cells }
 }
 
 /// Triangles with three valid corners, and the number of cells that lost one or both.

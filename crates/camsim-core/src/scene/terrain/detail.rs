@@ -132,8 +132,6 @@ impl Tolerances {
 pub struct TerrainDetail<'a> {
     pub(super) terrain: &'a Terrain,
     judge: Judge,
-    /// Tolerance of each chunk.
-    chunks: Vec<u16>,
     /// Chunks in sight that have a surface, by number.
     pub(super) in_sight: Vec<u32>,
     /// Of these chunks; a mesh does without.
@@ -145,18 +143,16 @@ impl<'a> TerrainDetail<'a> {
     /// length. Nothing that is seen is moved by more than `max_error_px`; with a tolerance too small for anything it is the full surface.
     pub fn new(terrain: &'a Terrain, camera: &CameraPose, tangents: [f64; 4], focal_px: f64, max_error_px: f64) -> Self {
         let judge = Judge::new(camera, tangents, focal_px, max_error_px);
-        let mut chunks = vec![OUT_OF_SIGHT; terrain.chunks.len()];
         let mut in_sight = Vec::new();
-        terrain.tree.visit(CHUNK_CELLS, &|bounds| judge.frustum.may_see(bounds), &mut |[x, y], bounds| {
+        terrain.tree.visit(CHUNK_CELLS, &|bounds| judge.frustum.may_see(bounds), &mut |[x, y]| {
             let chunk = y * terrain.chunk_grid[0] + x;
-            chunks[chunk as usize] = judge.tolerance(bounds, terrain.horizontal_m[NODE_CELLS.len() - 1]);
             if terrain.chunks[chunk as usize].has_surface {
                 in_sight.push(chunk);
             }
         });
         in_sight.sort_unstable();
         let tolerances = in_sight.iter().map(|_| OnceLock::new()).collect();
-        Self { terrain, judge, chunks, in_sight, tolerances }
+        Self { terrain, judge, in_sight, tolerances }
     }
 
     /// The tolerance that was asked for, pixels.
@@ -217,6 +213,14 @@ impl<'a> TerrainDetail<'a> {
         self.of_square(known, 0, column, row) != OUT_OF_SIGHT
     }
 
+    /// Least depth of what is in sight of a square, and distance over depth at most; `None` out of sight.
+    pub(super) fn least_depth(&self, cells: u32, at: [i64; 2]) -> Option<(f64, f64)> {
+        let bounds = self.terrain.tree.square(cells, at).filter(|bounds| self.judge.frustum.may_see(bounds))?;
+        let position_ned_m = self.judge.position_ned_m;
+        let from_camera = Aabb { min: bounds.min - position_ned_m, max: bounds.max - position_ned_m };
+        Some((self.judge.depths(&from_camera).0, self.judge.slant))
+    }
+
     fn strictest(&self, known: &Tolerances, squares: &Squares) -> u16 {
         let mut strictest = OUT_OF_SIGHT;
         for row in squares.rows() {
@@ -245,10 +249,6 @@ impl<'a> TerrainDetail<'a> {
         let (cells, per_chunk) = (NODE_CELLS[size], CHUNK_CELLS / NODE_CELLS[size]);
         let at = [chunk % grid[0], chunk / grid[0]].map(|n| i64::from(n * per_chunk));
         let at = [at[0] + i64::from(column), at[1] + i64::from(row)];
-        if size + 1 == NODE_CELLS.len() {
-            let is_chunk = (0..2).all(|k| (0..i64::from(grid[k])).contains(&at[k]));
-            return if is_chunk { self.chunks[(at[1] * i64::from(grid[0]) + at[0]) as usize] } else { OUT_OF_SIGHT };
-        }
         let bounds = self.terrain.tree.square(cells, at);
         bounds.map_or(OUT_OF_SIGHT, |bounds| self.judge.tolerance(bounds, self.terrain.horizontal_m[size]))
     }

@@ -444,3 +444,60 @@ fn where_everything_is_missing_nothing_is_drawn() {
     let drawn = covered(&terrain, &triangles(&terrain, &mesh)).len();
     assert_eq!((mesh.chunks.clone(), drawn), (vec![1, 2], 2 * 122 * 64));
 }
+
+#[test]
+fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
+    let terrain = hills(64 * 11 + 9, 64 * 7 + 30, 10.0, 60.0);
+    let mut random = Random(31);
+    let (mut found, mut hidden) = (0, 0);
+    for _ in 0..60 {
+        let position = DVec3::new(random.within(-6000.0, 4000.0), random.within(-5000.0, 5000.0), random.within(-2500.0, -100.0));
+        let camera = forward(position, random.within(0.0, 1.5));
+        let mesh = detail(&terrain, &camera, random.within(0.2, 20.0));
+        let frustum = Frustum::new(&camera, TANGENTS);
+        let seen: Vec<u32> = (0..terrain.chunks.len() as u32)
+            .filter(|&chunk| {
+                let at = [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]].map(i64::from);
+                frustum.may_see(terrain.tree.square(CHUNK_CELLS, at).unwrap())
+            })
+            .collect();
+        assert_eq!(mesh.chunks, seen);
+        (found, hidden) = (found + seen.len(), hidden + terrain.chunks.len() - seen.len());
+        // Drawn one after the other, the nearest first.
+        let mut places: Vec<u32> = mesh.indices.iter().map(|index| index >> VERTEX_BITS).collect();
+        places.dedup();
+        let distance_m = |&place: &u32| terrain.chunks[mesh.chunks[place as usize] as usize].bounds.distance_m(position);
+        assert!(places.is_sorted_by(|a, b| distance_m(a) <= distance_m(b)));
+        places.sort_unstable();
+        assert!(places.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+    assert!(found > 300 && hidden > 300, "{found} {hidden}");
+}
+
+#[test]
+fn parts_of_the_border_tell_what_all_its_sides_do() {
+    let mut random = Random(37);
+    let mut found = [0, 0];
+    for bend_m in [0.0, 40.0, -25.0] {
+        // Sides bulge or cave in; 3 x 2 chunks and some.
+        let (cols, rows) = (64 * 3 + 20, 64 * 2 + 5);
+        let uvs = vec![[0.0; 2]; (cols * rows) as usize];
+        let points: Vec<DVec3> = (0..cols * rows)
+            .map(|k| {
+                let [i, j] = [f64::from(k % cols) / f64::from(cols - 1), f64::from(k / cols) / f64::from(rows - 1)];
+                let bulge = |t: f64| bend_m * (std::f64::consts::PI * t).sin();
+                DVec3::new((0.5 - j) * (1300.0 + 2.0 * bulge(i)), (i - 0.5) * (2100.0 + 2.0 * bulge(j)), 0.0)
+            })
+            .collect();
+        let texture = Arc::new(crate::scene::Texture::uniform([255; 4], crate::scene::Encoding::Srgb));
+        let terrain = Terrain::new(cols, rows, &points, &uvs, texture).unwrap();
+        for _ in 0..400 {
+            let place = glam::DVec2::new(random.within(-700.0, 700.0), random.within(-1150.0, 1150.0));
+            let turns: Vec<f64> = (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
+            let all = turns.iter().all(|&turn| turn > 0.0) || turns.iter().all(|&turn| turn < 0.0);
+            assert_eq!(terrain.border_faces_away_from(place.extend(-500.0)), all, "{place} {bend_m}");
+            found[usize::from(all)] += 1;
+        }
+    }
+    assert!(found[0] > 150 && found[1] > 300, "{found:?}");
+}

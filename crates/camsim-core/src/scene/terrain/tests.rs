@@ -199,3 +199,19 @@ fn hostile_queries_answer_without_panic() {
     }
     assert_eq!(terrain.intersect(DVec3::new(0.0, 0.0, -100.0), DVec3::ZERO, 1e9), None);
 }
+
+#[test]
+fn one_large_chunk_rounds_all_positions() {
+    // 40 x 40 chunks, one of them with a peak higher than any other chunk is wide: not among those that are looked at first.
+    let side = 64 * 40 + 1;
+    let mut heights = vec![0.0; (side * side) as usize];
+    let peak = [64 * 17 + 30, 64 * 23 + 11];
+    heights[(peak[1] * side + peak[0]) as usize] = 9000.0;
+    let terrain = Terrain::from_heights(side, side, 3.0, &heights, None).unwrap();
+    // Half of 9000 m needs 13 bits, of 24.
+    assert_eq!(terrain.quantum_m, 2f64.powi(13 - 23));
+    let (chunk, [i, j]) = terrain.chunk_of_cell(peak);
+    let at = DVec3::new((32.0 * 40.0 - f64::from(peak[1])) * 3.0, (f64::from(peak[0]) - 32.0 * 40.0) * 3.0, -9000.0);
+    assert_eq!(terrain.position_ned_m(chunk, i, j), at);
+    assert!((27.0..31.0).contains(&(terrain.host_bytes() as f64 / f64::from(side * side))), "{}", terrain.host_bytes());
+}

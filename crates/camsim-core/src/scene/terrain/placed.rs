@@ -1,0 +1,97 @@
+//! What a device needs of a terrain for one ideal frame: the vertices of the triangles that are drawn, and no others.
+
+use glam::{DVec3, Vec3};
+
+use super::{CHUNK_CELLS, LodSelection, Terrain, TerrainMesh, VERTEX_BITS};
+
+/// Triangles to draw.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlacedMesh {
+    /// North, east, down from a base in whole metres, and texture coordinates, in the order of their first use; one on a chunk's border stands
+    /// there for each chunk. Positions are the correctly rounded sums of two exact numbers, so that these chunks agree in every bit.
+    pub vertices: Vec<[f32; 5]>,
+    /// Three a triangle.
+    pub indices: Vec<u32>,
+    /// Tiles of the ground's picture that they may be read from; none for a picture that is whole.
+    pub tiles: Vec<u32>,
+    /// What that comes to.
+    pub lod: LodSelection,
+}
+
+impl PlacedMesh {
+    /// What the device holds of it: 20 bytes a vertex and 4 an index.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        (size_of_val(&*self.vertices) + size_of_val(&*self.indices)) as u64
+    }
+}
+
+impl TerrainMesh {
+    /// With the vertices themselves, seen from a base near the camera. The base is in whole metres, as chunk centres are.
+    #[must_use]
+    pub fn placed(&self, terrain: &Terrain, base_ned_m: DVec3) -> PlacedMesh {
+        const NONE: u32 = u32::MAX;
+        let mut placed = PlacedMesh { indices: Vec::with_capacity(self.indices.len()), lod: self.lod, ..PlacedMesh::default() };
+        // A vertex of this chunk, if it was used before, by its number.
+        let mut known = vec![NONE; ((CHUNK_CELLS + 1) * (CHUNK_CELLS + 1)) as usize];
+        for of_chunk in self.indices.chunk_by(|a, b| a >> VERTEX_BITS == b >> VERTEX_BITS) {
+            let chunk = &terrain.chunks[self.chunks[(of_chunk[0] >> VERTEX_BITS) as usize] as usize];
+            let centre_from_base_m = (chunk.centre_ned_m - base_ned_m).as_vec3();
+            known.fill(NONE);
+            for index in of_chunk {
+                let vertex = index & ((1 << VERTEX_BITS) - 1);
+                let number = &mut known[vertex as usize];
+                if *number == NONE {
+                    *number = placed.vertices.len() as u32;
+                    let of = &terrain.vertices[(chunk.first_vertex + vertex) as usize];
+                    let [north, east, down] = (centre_from_base_m + Vec3::from(of.offset_m)).to_array();
+                    placed.vertices.push([north, east, down, of.uv[0], of.uv[1]]);
+                }
+                placed.indices.push(*number);
+            }
+        }
+        placed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::{
+        super::{
+            TerrainDetail,
+            tests::{forward, hills},
+        },
+        *,
+    };
+
+    #[test]
+    fn every_corner_is_where_the_terrain_has_it() {
+        let terrain = hills(200, 150, 10.0, 40.0);
+        let camera = forward(DVec3::new(-600.25, 80.5, -150.0), 0.2);
+        let mesh = TerrainDetail::new(&terrain, &camera, [-0.7, 0.7, -0.5, 0.5], 300.0, 0.25).mesh_to_draw();
+        let base_ned_m = camera.position_ned_m.round();
+        let placed = mesh.placed(&terrain, base_ned_m);
+        assert!(placed.indices.len() > 3000 && placed.indices.len() == mesh.indices.len() && placed.lod == mesh.lod);
+        for (place, index) in placed.indices.iter().zip(&mesh.indices) {
+            let chunk = &terrain.chunks[mesh.chunks[(index >> VERTEX_BITS) as usize] as usize];
+            let vertex = terrain.vertices[(chunk.first_vertex + (index & ((1 << VERTEX_BITS) - 1))) as usize];
+            let exact_m = chunk.centre_ned_m - base_ned_m + Vec3::from(vertex.offset_m).as_dvec3();
+            // Rounded once.
+            let [north, east, down, uv @ ..] = placed.vertices[*place as usize];
+            assert_eq!(([north, east, down], uv), (exact_m.as_vec3().to_array(), vertex.uv));
+        }
+        // Nothing is there twice but what chunks share, and nothing that no triangle uses.
+        let mut used: Vec<u32> = placed.indices.clone();
+        used.sort_unstable();
+        used.dedup();
+        assert_eq!(used.len(), placed.vertices.len());
+        let inner = placed.vertices.len() - mesh.chunks.len() * 4 * 64;
+        let mut places: Vec<[u32; 3]> = placed.vertices.iter().map(|vertex| [vertex[0], vertex[1], vertex[2]].map(f32::to_bits)).collect();
+        places.sort_unstable();
+        places.dedup();
+        assert!(places.len() >= inner);
+        assert_eq!(placed.bytes(), 20 * placed.vertices.len() as u64 + 4 * placed.indices.len() as u64);
+    }
+}
