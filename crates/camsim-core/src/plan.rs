@@ -3,7 +3,7 @@
 //! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu crate executes it, and
 //! nothing in it depends on the frame before.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use glam::DVec2;
 use serde::Serialize;
@@ -36,6 +36,7 @@ mod motion;
 pub mod paper;
 mod probes;
 mod rounding;
+mod sharing;
 mod sight;
 mod stages;
 mod surfaces;
@@ -71,6 +72,12 @@ pub enum PlanError {
         "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
     )]
     NoRay,
+    /// A frame cannot be made from the same ideal frame as others. [`Planner::plan`] then makes it from its own.
+    #[error("frame {frame} cannot be made from the same ideal frame as others: silhouettes would cost too much")]
+    NotShared {
+        /// Frame number.
+        frame: u64,
+    },
     /// The ideal frame would be too large.
     #[error(
         "frame {frame} needs an ideal frame of {width}x{height} px, more than {limit} px a side: the field of view is too wide for a flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view"
@@ -142,6 +149,8 @@ pub struct FramePlan {
     pub key_twist: Twist,
     /// Instants and poses of the ideal frames, in order of time.
     pub keys: Vec<KeyFrame>,
+    /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
+    pub shared_by: Option<[u64; 2]>,
     /// Pixels of each ideal frame.
     pub ideal: IdealGeometry,
     /// Lens inverse.
@@ -169,9 +178,17 @@ pub struct FramePlan {
     pub predicted: Predicted,
     /// What is not done.
     pub skipped: Vec<Skip>,
+    /// Time that it is expected to take, roughly, in bilinear reads of every output pixel: what plans are compared by.
+    pub price: f64,
 }
 
 impl FramePlan {
+    /// Whether the one ideal frame was taken at another instant than the middle of the window.
+    #[must_use]
+    pub fn looks_from_elsewhere(&self) -> bool {
+        self.keys.len() == 1 && self.keys[0].t_s != self.key_s
+    }
+
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.
     #[must_use]
     pub fn tangents(&self) -> [f64; 4] {
@@ -198,6 +215,8 @@ pub struct Planner {
     surfaces: surfaces::Surfaces,
     truth: bool,
     max_side_px: u32,
+    /// The last groups of frames that were looked at.
+    groups: Mutex<sharing::Recent>,
 }
 
 impl Planner {
@@ -217,7 +236,7 @@ impl Planner {
         let outline = edges::SceneOutline::new(&sequence.scene);
         let grain = grain::SceneGrain::new(&sequence.scene);
         let surfaces = surfaces::Surfaces::new(sequence.scene.clone());
-        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px })
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px, groups: Mutex::default() })
     }
 
     /// The sequence.
@@ -250,6 +269,14 @@ impl Planner {
     /// # Errors
     /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
     pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        match self.shared_plan(frame)? {
+            Some(plan) => Ok(plan),
+            None => self.plan_from(frame, None),
+        }
+    }
+
+    /// The plan of a frame by itself, or from an ideal frame that others are made from too.
+    fn plan_from(&self, frame: u64, common: Option<&sharing::Common>) -> Result<FramePlan, PlanError> {
         let stamp_s = self.stamp_s(frame);
         let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
         let reach = match (&self.fixed, &self.zoom, zoom) {
@@ -260,7 +287,8 @@ impl Planner {
         let (first, last) = self.shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
         let span_s = self.sequence.path.span_s();
-        let key_s = 0.5 * (window_s[0] + window_s[1]);
+        let middle_s = 0.5 * (window_s[0] + window_s[1]);
+        let key_s = common.map_or(middle_s, |common| common.key_s);
         let quality = &self.sequence.scenario.quality;
         let scene = &self.sequence.scene;
         let path = &*self.sequence.path;
@@ -270,10 +298,12 @@ impl Planner {
         let demanded = forced::temporal_stage(quality);
         let is_paper = quality.preset == Preset::Paper;
         let geometry = |keys: &[KeyFrame], scale: f64, displaced: Option<(TemporalStage, Twist)>| {
-            bounds::ideal_geometry(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced, scale)
+            let own = || bounds::view(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced);
+            common.map_or_else(own, |common| common.view).pixels(&reach.camera, scale)
         };
+        let frames_per_ideal = common.map_or(1.0, |common| common.count() as f64);
         let displaced = demanded.map(|stage| (stage, key_twist));
-        let one_key = keys::spread(path, window_s, 1);
+        let one_key = vec![KeyFrame { t_s: key_s, pose: key_pose }];
         let least_scale = reach.least_scale();
         let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale, displaced) };
         let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
@@ -297,34 +327,65 @@ impl Planner {
         let outlook = (silhouettes_in_view && may_leave_plain && !is_paper).then(|| {
             let gain = &levels::gain(&self.sequence, &reach.camera);
             let (surfaces, shutter) = (&self.surfaces, &self.shutter);
-            contours::Search { reach: &reach, surfaces, path, shutter, stamp_s, key_pose: &key_pose, gain }.outlook()
+            let trial = dry_run::Trial {
+                surfaces,
+                path,
+                shutter,
+                stamp_s,
+                key_s,
+                key_pose: &key_pose,
+                ideal: &ideal,
+                twist: key_twist,
+                nearest_depth: false,
+            };
+            let truths = error::Truths::of_silhouettes(&reach, trial);
+            let (holes, least_share) = (truths.holes(&one_key, quality.max_error_px), truths.silhouette_share());
+            contours::Search { reach: &reach, surfaces, path, shutter, stamp_s, key_pose: &key_pose, gain, holes, least_share }.outlook()
         });
+        if let (Some(common), Some(outlook), Silhouettes::Auto) = (common, outlook, quality.silhouettes) {
+            let scale = common.given.as_ref().map_or(levels::MOST_SCALE, |sampling| sampling.scale);
+            if !outlook.at_scale(scale).are_affordable(quality.max_error_dn) {
+                return Err(PlanError::NotShared { frame });
+            }
+        }
         let mut plain = None;
+        let mut price = 0.0;
         let sampling = if is_paper {
             levels::Sampling::of_paper()
         } else {
             let side_px = ideal.size_px[0].max(ideal.size_px[1]);
             let fits = |scale: f64| f64::from(side_px) * scale / least_scale < f64::from(self.max_side_px);
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale);
+            let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale * frames_per_ideal);
             let exposure = exposed(&motion, &ideal).path(quality, &mut Vec::new());
             let max_error_dn = quality.max_error_dn;
             let choose = |tolerance_dn: &dyn Fn(f64) -> Option<f64>| {
                 prospect.choose(quality, tolerance_dn, least_scale, ideal_share, exposure, fits)
             };
-            let beside_rays = choose(&|_| Some(max_error_dn));
-            plain = outlook.and_then(|outlook| {
-                let found = choose(&|scale| outlook.at_scale(scale).leaves_dn(max_error_dn));
-                let is_cheaper =
-                    found.within.is_some_and(|price| beside_rays.within.is_none_or(|other| price < other + outlook.price_of_rays()));
-                match quality.silhouettes {
-                    Silhouettes::Plain if found.within.is_none() => Some((outlook, beside_rays.sampling)),
-                    _ => (is_cheaper || quality.silhouettes == Silhouettes::Plain).then_some((outlook, found.sampling)),
+            let with_plain = |outlook: contours::Outlook| choose(&|scale| outlook.at_scale(scale).leaves_dn(max_error_dn));
+            let choice = match common.map(|common| &common.given) {
+                Some(Some(sampling)) => {
+                    plain = outlook;
+                    prospect.given(sampling, quality, ideal_share, exposure)
                 }
-            });
-            plain.map_or(beside_rays.sampling, |(_, sampling)| sampling)
+                Some(None) => {
+                    plain = outlook;
+                    outlook.map_or_else(|| choose(&|_| Some(max_error_dn)), with_plain)
+                }
+                None => {
+                    let mut beside_rays = choose(&|_| Some(max_error_dn));
+                    beside_rays.price += outlook.map_or(0.0, |outlook| outlook.price_of_rays());
+                    let found = outlook.map(with_plain);
+                    let is_cheaper = found.is_some_and(|found| found.within && (!beside_rays.within || found.price < beside_rays.price));
+                    let is_plain = is_cheaper || quality.silhouettes == Silhouettes::Plain;
+                    plain = outlook.filter(|_| is_plain);
+                    found.filter(|found| is_plain && found.within).unwrap_or(beside_rays)
+                }
+            };
+            price = choice.price;
+            choice.sampling
         };
-        let plain = plain.map(|(outlook, _)| outlook.at_scale(sampling.scale));
+        let plain = plain.map(|outlook| outlook.at_scale(sampling.scale));
         if sampling.scale != least_scale && !is_paper {
             ideal = geometry(&one_key, sampling.scale, displaced);
             motion = measure(&ideal);
@@ -377,6 +438,7 @@ impl Planner {
             levels_in_the_way: levels::in_the_way(quality, &sampling, expected, plain.as_ref()),
             plain,
             silhouettes_in_view,
+            constant_twist: common.is_none(),
             surfaces: &self.surfaces,
         };
         let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion);
@@ -402,6 +464,8 @@ impl Planner {
         predicted.holes =
             if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
         self.note_static_skips(&mut skipped, temporal);
+        price += way.price();
+        let key_pose = if common.is_some() { path.pose(middle_s) } else { key_pose };
         Ok(FramePlan {
             frame,
             preset: quality.preset,
@@ -411,10 +475,11 @@ impl Planner {
             zoom,
             camera: reach.camera.clone(),
             shutter: self.shutter,
-            key_s,
+            key_s: middle_s,
             key_pose,
             key_twist,
             keys,
+            shared_by: None,
             ideal,
             ray,
             temporal,
@@ -428,6 +493,7 @@ impl Planner {
             terrain_error_px,
             predicted,
             skipped,
+            price,
         })
     }
 

@@ -18,7 +18,9 @@ pub use camera::{
     ZoomSpec,
 };
 pub use scene::{HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
-pub use validate::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera};
+pub use validate::{
+    MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera,
+};
 
 /// Everything that one run depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -199,6 +201,9 @@ pub struct QualitySpec {
     pub ideal_scale: Auto<f64>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
+    /// Output frames that may be made from one ideal frame, at most [`MAX_FRAMES_PER_IDEAL`].
+    #[serde(default = "frames_per_ideal")]
+    pub frames_per_ideal: u32,
     /// Colours of pixels at silhouettes.
     #[serde(default)]
     pub silhouettes: Silhouettes,
@@ -217,9 +222,14 @@ impl Default for QualitySpec {
             footprint_taps: Auto::Auto,
             ideal_scale: Auto::Auto,
             key_frames: Auto::Auto,
+            frames_per_ideal: frames_per_ideal(),
             silhouettes: Silhouettes::Auto,
         }
     }
+}
+
+fn frames_per_ideal() -> u32 {
+    8
 }
 
 /// Sets of methods.

@@ -10,7 +10,7 @@ use camsim_core::{
     frame::RenderedFrame,
     noise::tail_table,
     photometric::vignette_weights,
-    plan::{EdgeStage, FramePlan, Planner, RayStage},
+    plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
     pose::CameraPose,
     scenario::Channel,
     scene::LodSelection,
@@ -164,6 +164,7 @@ struct Drawn {
     ideal: IdealGeometry,
     edges: EdgeStage,
     terrain_error_px: f64,
+    surface_reads: SurfaceReads,
     target: usize,
     /// The slot of its frame.
     slot: usize,
@@ -370,6 +371,7 @@ impl Session<'_> {
                 && drawn.ideal == plan.ideal
                 && drawn.edges == plan.edges
                 && drawn.terrain_error_px == plan.terrain_error_px
+                && drawn.surface_reads == plan.surface_reads
         }) {
             return Ok(());
         }
@@ -410,8 +412,16 @@ impl Session<'_> {
             &prepared.meshes,
             &self.targets[target].ideal,
         )?;
-        self.drawn =
-            Some(Drawn { poses, ideal: plan.ideal, edges: plan.edges, terrain_error_px: plan.terrain_error_px, target, slot, lod });
+        self.drawn = Some(Drawn {
+            poses,
+            ideal: plan.ideal,
+            edges: plan.edges,
+            terrain_error_px: plan.terrain_error_px,
+            surface_reads: plan.surface_reads,
+            target,
+            slot,
+            lod,
+        });
         Ok(())
     }
 

@@ -25,7 +25,7 @@ use crate::{
 mod key;
 pub mod lens_inverse;
 
-pub use key::{EdgeKind, PipelineKey, TapKind, TemporalKind};
+pub use key::{EdgeKind, KeyKind, PipelineKey, TapKind, TemporalKind};
 
 /// The kernel's main file.
 pub const SHADER: &str = "reverse/reverse.wgsl";

@@ -68,6 +68,8 @@ embedded![
     "reverse/gather/tap/grid.wgsl",
     "reverse/gather/tap/spline.wgsl",
     "reverse/ideal_frame.wgsl",
+    "reverse/keys/elsewhere.wgsl",
+    "reverse/keys/one.wgsl",
     "reverse/keys/several.wgsl",
     "reverse/keys/single.wgsl",
     "reverse/lens_inverse/brown_conrady.wgsl",

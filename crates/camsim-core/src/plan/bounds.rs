@@ -116,11 +116,36 @@ fn candidates(camera: &CameraModel) -> Vec<(DVec2, [u32; 2])> {
     found
 }
 
-/// The ideal frame that holds every source of the frame: each kept ray at its own line's instants (start, middle and end of the
+/// Directions that an ideal frame holds, tangents in its own camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct View {
+    low: DVec2,
+    high: DVec2,
+}
+
+impl View {
+    /// All of both.
+    pub fn and(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Its pixels. `scale` is that of its focal length to the camera's.
+    pub fn pixels(self, camera: &CameraModel, scale: f64) -> IdealGeometry {
+        let focal_px = camera.focal_px * scale;
+        // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels fall together.
+        let principal_px = camera.principal_point_px;
+        let first_px = (self.low * focal_px + principal_px).floor() - RIM_PX;
+        let last_px = (self.high * focal_px + principal_px).ceil() + RIM_PX;
+        let size = last_px - first_px + 1.0;
+        let side = |length: f64| if length.is_finite() { length.clamp(2.0, f64::from(u32::MAX / 2)) as u32 } else { u32::MAX / 2 };
+        IdealGeometry { size_px: [side(size.x), side(size.y)], focal_px, principal_px: principal_px - first_px }
+    }
+}
+
+/// What an ideal frame must show to hold every source of the frame: each kept ray at its own line's instants (start, middle and end of the
 /// exposure), at infinity and at the nearest depth in view, in the two keys that are nearest in time. A `demanded` constant-twist solver
-/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth. `scale` is that of its focal length
-/// to the camera's.
-pub(super) fn ideal_geometry(
+/// also looks where the point is not: there too, and at the ray's own place, where it reads the depth.
+pub(super) fn view(
     reach: &LensReach,
     path: &CameraPath,
     shutter: &Shutter,
@@ -129,17 +154,14 @@ pub(super) fn ideal_geometry(
     keys: &[KeyFrame],
     surfaces: &Surfaces,
     demanded: Option<(TemporalStage, Twist)>,
-    scale: f64,
-) -> IdealGeometry {
+) -> View {
     let key = path.pose(key_s);
-    let focal_px = reach.camera.focal_px * scale;
     let (first, last) = shutter.window_s();
     let travel_m = super::travel_m(path, [stamp_s + first, stamp_s + last], key_s);
     let slant = reach.slant();
     let tangents = still_tangents(reach, slant);
     let inverse_near = 1.0 / surfaces.nearest_m(&key, tangents, travel_m);
-    let mut low = DVec2::splat(f64::INFINITY);
-    let mut high = DVec2::splat(f64::NEG_INFINITY);
+    let mut view = View { low: DVec2::splat(f64::INFINITY), high: DVec2::splat(f64::NEG_INFINITY) };
     let last_row = reach.camera.size_px[1] - 1;
     // The grid of the reach steps over rows of one parity: a neighbour stands for the other field.
     let in_fields = reach.rays.iter().flat_map(|&(uv, [x, y])| {
@@ -148,10 +170,7 @@ pub(super) fn ideal_geometry(
     });
     for (uv, dt_s) in in_fields {
         let mid_s = stamp_s + dt_s;
-        let mut include = |at: DVec2| {
-            low = low.min(at);
-            high = high.max(at);
-        };
+        let mut include = |at: DVec2| view = view.and(View { low: at, high: at });
         for phase in [-0.5, 0.0, 0.5] {
             let t_s = mid_s + phase * shutter.exposure_s();
             let pose = path.pose(t_s);
@@ -170,13 +189,7 @@ pub(super) fn ideal_geometry(
             }
         }
     }
-    // Whole pixels from the camera's own principal point: without lens and motion the two frames' pixels fall together.
-    let principal_px = reach.camera.principal_point_px;
-    let first_px = (low * focal_px + principal_px).floor() - RIM_PX;
-    let last_px = (high * focal_px + principal_px).ceil() + RIM_PX;
-    let size = last_px - first_px + 1.0;
-    let side = |length: f64| if length.is_finite() { length.clamp(2.0, f64::from(u32::MAX / 2)) as u32 } else { u32::MAX / 2 };
-    IdealGeometry { size_px: [side(size.x), side(size.y)], focal_px, principal_px: principal_px - first_px }
+    view
 }
 
 /// View of the camera were it still, with a tenth to spare.

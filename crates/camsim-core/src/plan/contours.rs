@@ -2,14 +2,15 @@
 //! an output pixel reads from there as it does elsewhere.
 //!
 //! Two things go wrong. The border runs along whole pixels, so that pixels on it have too much of one surface; and within the parallax
-//! between the two surfaces a pixel looks where the other one is. Both are a share of the contrast across the border, in a strip whose
-//! width the probes' own rays tell.
+//! between the two surfaces a pixel looks where the other one is. Both are a share of the contrast across the border. How wide the strip within
+//! parallax is the rays around the probes tell; a few silhouettes have most of it, at which hardly any probe stands, so that the share that holes
+//! have of the picture (`holes.rs`) is asked too.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{LensReach, levels::path_px, probes::Probe, surfaces::Surfaces};
+use super::{Holes, LensReach, levels::path_px, probes::Probe, surfaces::Surfaces};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
@@ -19,6 +20,8 @@ use crate::{
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
 const SAFETY: f64 = 1.2;
+/// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
+const STRIPS: f64 = 2.0;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
 const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
@@ -30,12 +33,12 @@ pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 
 /// What silhouettes cost if they are left as the ideal frame's pixels show them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Contours {
-    /// Share of the pixels within 3 px of one.
+    /// Share of the pixels within 3 px of one, folds of depth included.
     pub share: f64,
     /// RMS contrast across them, 1/255 of the linear range.
     pub contrast_dn: f64,
-    /// RMS parallax across them between the pixel's instant and the ideal frame's, pixels of the camera.
-    pub parallax_px: f64,
+    /// Share of the picture that the ideal frame's camera does not see behind them.
+    pub hidden_share: f64,
     /// RMS error of those pixels, 1/255 of the linear range.
     pub at_dn: f64,
     /// RMS error over the picture by them, 1/255 of the linear range.
@@ -52,6 +55,9 @@ pub(super) struct Search<'a> {
     pub key_pose: &'a CameraPose,
     /// Of the linear range for a pixel, for each unit of light that arrives.
     pub gain: &'a (dyn Fn([u32; 2]) -> f64 + Sync),
+    /// What the ideal frame's camera does not see, and the share of the pixels at silhouettes as it is told by rays around some of the probes.
+    pub holes: Holes,
+    pub least_share: f64,
 }
 
 /// The same for ideal frames of any scale.
@@ -59,29 +65,34 @@ pub(super) struct Search<'a> {
 pub(super) struct Outlook {
     share: f64,
     contrast_dn: f64,
-    parallax_px: f64,
-    /// Mean squared error of pixels at silhouettes: by stairs at the camera's own scale, and by strips.
+    hidden_share: f64,
+    /// Mean squared errors over the picture, of the linear range: by stairs at the camera's own scale, and by strips.
     squares: [f64; 2],
 }
 
 /// One probe near a silhouette.
 struct Contour {
     contrast2: f64,
-    parallax_px: f64,
     path_px: f64,
+    /// Parallax between the two surfaces, across the border.
+    strip_px: f64,
 }
 
 impl Contour {
-    /// Squared errors, means over the pixels within reach, of a border along whole pixels of the camera's size and of the strip beside it.
+    /// Squared error, mean over the pixels within reach, of a border along whole pixels of the camera's size.
     ///
     /// Where the border truly is within such a pixel is any place alike, so that one pixel of each line across has 1/12 of the squared
-    /// contrast. A strip narrower than a pixel is as much less of one pixel. The path over the exposure spreads both over its length: as many
-    /// times less of the contrast in as many times more pixels. Of stairs half of that, since many paths run along the border.
-    fn squares(&self) -> [f64; 2] {
-        let Self { contrast2, parallax_px, path_px } = *self;
-        let stairs = (12.0 * (1.0 + path_px).sqrt()).recip();
-        let strip = parallax_px * parallax_px / (parallax_px.max(1.0) + path_px);
-        [stairs, strip].map(|width_px| SAFETY * SAFETY * contrast2 * (width_px / f64::from(2 * NEAR_PX + 1)).min(1.0))
+    /// contrast. The path over the exposure spreads that over its length, as many times less of the contrast in as many times more pixels;
+    /// half of that, since many paths run along the border.
+    fn stairs(&self) -> f64 {
+        let width_px = (12.0 * (1.0 + self.path_px).sqrt()).recip();
+        SAFETY * SAFETY * self.contrast2 * width_px / f64::from(2 * NEAR_PX + 1)
+    }
+
+    /// The same of the strip within parallax: narrower than a pixel it is as much less of one, and the exposure spreads it over its path.
+    fn strip(&self) -> f64 {
+        let width_px = self.strip_px * self.strip_px / (self.strip_px.max(1.0) + self.path_px);
+        self.contrast2 * (width_px / f64::from(2 * NEAR_PX + 1)).min(1.0)
     }
 }
 
@@ -93,17 +104,22 @@ impl Outlook {
 
     /// With so many ideal pixels for each of the camera's.
     pub fn at_scale(&self, scale: f64) -> Contours {
-        let Self { share, contrast_dn, parallax_px, squares: [stairs, strips] } = *self;
-        let at_dn = 255.0 * (stairs / (scale * scale) + strips).sqrt();
-        Contours { share, contrast_dn, parallax_px, at_dn, error_dn: at_dn * share.sqrt() }
+        let Self { share, contrast_dn, hidden_share, squares: [stairs, strips] } = *self;
+        let error_dn = 255.0 * (stairs / (scale * scale) + strips).sqrt();
+        let at_dn = if share > 0.0 { error_dn / share.sqrt() } else { 0.0 };
+        Contours { share, contrast_dn, hidden_share, at_dn, error_dn }
     }
 }
 
 impl Contours {
+    /// Whether they cost little enough of a tolerance.
+    pub(super) fn are_affordable(&self, max_error_dn: f64) -> bool {
+        self.error_dn <= SHARE * max_error_dn && self.at_dn <= TIMES_AT * max_error_dn
+    }
+
     /// What is left of a tolerance for all else where silhouettes are left as they are; `None` where they cost too much of it.
     pub(super) fn leaves_dn(&self, max_error_dn: f64) -> Option<f64> {
-        let affordable = self.error_dn <= SHARE * max_error_dn && self.at_dn <= TIMES_AT * max_error_dn;
-        affordable.then(|| (max_error_dn * max_error_dn - self.error_dn * self.error_dn).sqrt())
+        self.are_affordable(max_error_dn).then(|| (max_error_dn * max_error_dn - self.error_dn * self.error_dn).sqrt())
     }
 }
 
@@ -113,11 +129,14 @@ impl Search<'_> {
         let found: Vec<Option<Contour>> = probes.par_iter().with_min_len(16).map(|probe| self.look(probe)).collect();
         let near = found.iter().flatten().count();
         let mean = |of: &dyn Fn(&Contour) -> f64| found.iter().flatten().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
+        let share = near as f64 / probes.len().max(1) as f64;
+        let contrast2 = mean(&|contour| contour.contrast2);
+        let stairs = share * mean(&Contour::stairs);
         Outlook {
-            share: near as f64 / probes.len().max(1) as f64,
-            contrast_dn: 255.0 * mean(&|contour| contour.contrast2).sqrt(),
-            parallax_px: mean(&|contour| contour.parallax_px.powi(2)).sqrt(),
-            squares: [0, 1].map(|part: usize| mean(&|contour| contour.squares()[part])),
+            share: share.max(self.least_share),
+            contrast_dn: 255.0 * contrast2.sqrt(),
+            hidden_share: self.holes.share,
+            squares: [stairs, STRIPS * contrast2 * self.holes.narrow_share + share * mean(&Contour::strip)],
         }
     }
 
@@ -144,15 +163,18 @@ impl Search<'_> {
             .collect();
         let of_probe = rotation * probe.uv.extend(1.0);
         let key_px = |inverse_depth: f64| {
-            let in_key: DVec3 = of_probe + inverse_depth * shift;
+            let in_key = of_probe + inverse_depth * shift;
             self.reach.camera.focal_px * in_key.truncate() / in_key.z
         };
+        // Across the border, towards what is nearer: along it parallax shows the same again.
+        let towards = places.iter().zip(inverse_depth).fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
+        let normal = (self.reach.camera.focal_px * (probe.uv_from_px * towards)).normalize_or_zero();
+        let strip_px = |&[a, b]: &[usize; 2]| (key_px(inverse_depth[a]) - key_px(inverse_depth[b])).dot(normal).abs();
         let color = |i: usize| self.surfaces.color(met[i].as_ref(), uv(places[i]).extend(1.0).length());
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
-        let parallax_px = |&[a, b]: &[usize; 2]| key_px(inverse_depth[a]).distance(key_px(inverse_depth[b]));
         (!across.is_empty()).then(|| Contour {
+            strip_px: across.iter().map(strip_px).fold(0.0, f64::max),
             contrast2: (self.gain)(probe.pixel).powi(2) * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
-            parallax_px: across.iter().map(parallax_px).fold(0.0, f64::max),
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], self.reach.camera.focal_px).1,
         })
     }
@@ -164,7 +186,7 @@ mod tests {
 
     use std::sync::Arc;
 
-    use glam::DQuat;
+    use glam::{DQuat, DVec3};
 
     use super::*;
     use crate::{
@@ -179,7 +201,7 @@ mod tests {
     const SPEED_M_S: f64 = 40.0;
 
     /// A white roof of 50 m, 50 m above black ground, from 100 m above it, flying east with a readout of 100 ms.
-    fn outlook(exposure_ms: f64, gain: f64) -> Outlook {
+    fn outlook(exposure_ms: f64, gain: f64, holes: Holes) -> Outlook {
         let of = |byte: u8| Arc::new(Texture::uniform([byte, byte, byte, 255], Encoding::Linear));
         let roof = Mesh::level_picture(of(255), DVec3::new(0.0, 0.0, -50.0), 50.0);
         let scene = Scene { meshes: vec![Mesh::level_picture(of(0), DVec3::ZERO, 5000.0), roof], ..Scene::default() };
@@ -200,28 +222,51 @@ mod tests {
         let reach = LensReach::new(Arc::new(camera)).unwrap();
         let (key_pose, gain) = (path.pose(0.0), |_: [u32; 2]| gain);
         let surfaces = Surfaces::new(Arc::new(scene));
-        Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, key_pose: &key_pose, gain: &gain }
-            .outlook()
+        Search {
+            reach: &reach,
+            surfaces: &surfaces,
+            path: &path,
+            shutter: &shutter,
+            stamp_s: 0.0,
+            key_pose: &key_pose,
+            gain: &gain,
+            holes,
+            least_share: 0.0,
+        }
+        .outlook()
     }
 
     #[test]
-    fn a_roof_has_its_border_contrast_and_parallax() {
-        let found = outlook(0.0, 1.0).at_scale(1.0);
+    fn a_roof_has_its_border_and_contrast() {
+        let found = outlook(0.0, 1.0, Holes::default()).at_scale(1.0);
         // 100 px a side: a band of 6 px along 400 px, of 120 000.
         assert!((found.share / 0.02 - 1.0).abs() < 0.5, "{found:?}");
         assert!((found.contrast_dn - 255.0).abs() < 1e-3, "{found:?}");
-        // Half a metre a line's 1/30 of the way at the roof's upper and lower border, 50 px from the middle: (1/100 - 1/150) of it.
-        let most_px = FOCAL_PX * SPEED_M_S * 0.05 / 3.0 * (1.0 / 100.0 - 1.0 / 150.0);
-        assert!(found.parallax_px > 0.3 * most_px && found.parallax_px < 1.1 * most_px, "{found:?} {most_px}");
-        assert_eq!(outlook(0.0, 0.5).at_scale(1.0).contrast_dn, 0.5 * found.contrast_dn);
+        let half = outlook(0.0, 0.5, Holes::default()).at_scale(1.0);
+        assert_eq!((half.contrast_dn, half.error_dn), (0.5 * found.contrast_dn, 0.5 * found.error_dn));
+    }
+
+    #[test]
+    fn strips_are_those_within_parallax_and_those_that_are_hidden() {
+        let outlook_of = |holes| outlook(0.0, 1.0, holes).at_scale(f64::INFINITY);
+        let found = outlook_of(Holes::default());
+        // At the roof's two borders across the flight 50 px from the middle: a sixth of the readout from its middle the camera has flown 2/3 m, and
+        // (1/100 - 1/150) of that is between roof and ground.
+        let width_px = FOCAL_PX * SPEED_M_S * 0.1 / 6.0 * (1.0 / 100.0 - 1.0 / 150.0);
+        // All along the other two borders the readout goes by, with parallax along and not across them.
+        let at_most_dn = 255.0 * width_px / 7_f64.sqrt();
+        assert!(found.at_dn < at_most_dn && found.at_dn > 0.1 * at_most_dn, "{found:?} {at_most_dn}");
+        let hidden = outlook_of(Holes { share: 1e-3, narrow_share: 1e-3, ..Holes::default() });
+        let added = (hidden.error_dn.powi(2) - found.error_dn.powi(2)) / 255_f64.powi(2);
+        assert!((added / (STRIPS * 1e-3) - 1.0).abs() < 1e-9 && hidden.hidden_share == 1e-3, "{hidden:?}");
     }
 
     #[test]
     fn finer_ideal_frames_and_blur_leave_less() {
-        let still = outlook(0.0, 1.0);
+        let still = outlook(0.0, 1.0, Holes::default());
         let [coarse, fine] = [1.0, 2.0].map(|scale| still.at_scale(scale).at_dn);
         assert!(fine < coarse && fine > 0.5 * coarse, "the strips stay: {fine} {coarse}");
-        let blurred = outlook(20.0, 1.0).at_scale(1.0);
+        let blurred = outlook(20.0, 1.0, Holes::default()).at_scale(1.0);
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);
         // White on black costs more than a 255th; nothing is left of it.
         assert!(blurred.leaves_dn(1.0).is_none());

@@ -37,6 +37,8 @@ pub struct PlanSummary<'a> {
     pub key_s: f64,
     /// Instants of the ideal frames, path time, seconds.
     pub key_times_s: Vec<f64>,
+    /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
+    pub shared_by: Option<[u64; 2]>,
     /// Passes in order.
     pub passes: Vec<String>,
     /// Lens inverse.
@@ -80,12 +82,13 @@ impl FramePlan {
             SurfaceReads::Four => "4 texture reads a pixel",
             SurfaceReads::Grid => "up to 2x32 texture reads a pixel",
         };
+        let shared = self.shared_by.map_or_else(String::new, |[first, last]| format!(", one for frames {first} to {last}"));
         let mut passes = Vec::new();
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}"));
+        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}{shared}"));
         if let EdgeStage::Supersampled { scale, thin, .. } = self.edges {
             let marks = format!("{width}x{height} px, marked where several surfaces are seen");
             let color = if scale > 1 { "rgba16float + " } else { "" };
@@ -161,6 +164,7 @@ impl FramePlan {
             ideal_focal_px: self.ideal.focal_px.to_array(),
             ideal_principal_px: self.ideal.principal_px.to_array(),
             key_s: self.key_s,
+            shared_by: self.shared_by,
             key_times_s: self.keys.iter().map(|key| key.t_s).collect(),
             passes: self.passes(),
             ray: self.ray,

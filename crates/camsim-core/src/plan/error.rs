@@ -117,6 +117,8 @@ pub(super) struct Case<'a> {
     /// Cost of silhouettes that are left as they are.
     pub plain: Option<Contours>,
     pub silhouettes_in_view: bool,
+    /// Whether the camera's twist at the key instant may stand for its motion.
+    pub constant_twist: bool,
     pub surfaces: &'a Surfaces,
 }
 
@@ -133,6 +135,29 @@ pub(super) struct Choice<'a> {
 pub(super) struct Way {
     pub temporal: TemporalStage,
     pub blur: Option<BlurStage>,
+}
+
+/// Prices of a camera of its own for each line, and of a look-up of depth: bilinear reads of an output pixel, from what `camsim bench` measures
+/// for a turn about the optical axis with each of the solvers.
+const POSE_PRICE: f64 = 3.0;
+const LOOK_UP_PRICE: f64 = 2.5;
+
+impl Way {
+    /// Beside what the reads themselves take, bilinear reads of an output pixel.
+    pub fn price(self) -> f64 {
+        let nodes = self.blur.map_or(1, |blur| blur.solved());
+        let looks = match self.blur.map(|blur| blur.depths) {
+            None | Some(NodeDepths::Mid) => 1,
+            Some(NodeDepths::Ends) => 2,
+            Some(NodeDepths::Each) => nodes,
+        };
+        let poses = f64::from(nodes) * POSE_PRICE;
+        match self.temporal {
+            TemporalStage::Identity => 0.0,
+            TemporalStage::Rotation | TemporalStage::Linear | TemporalStage::Rk2 => poses,
+            TemporalStage::Reproject { iterations } => poses + f64::from(iterations * looks) * LOOK_UP_PRICE,
+        }
+    }
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
@@ -172,7 +197,7 @@ impl Case<'_> {
         if may_skip_depth {
             ways.extend([TemporalStage::Identity, TemporalStage::Rotation].map(with));
         }
-        if quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view {
+        if self.constant_twist && quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view {
             ways.push(Way { temporal: TemporalStage::Linear, blur: self.straight_blur });
             if motion.rotation_rad < CHEAP_RK2_STEPS * RK2_STEP_DEG.to_radians() {
                 ways.push(with(TemporalStage::Rk2));
@@ -215,9 +240,7 @@ impl Case<'_> {
             Some(_) if self.sequence.path.highest_vibration_hz() > 0.0 => &PHASES[..],
             Some(_) => &PHASES[..AT_REST],
         };
-        let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
-        let looked = self.reach.probes.par_iter().enumerate().with_min_len(16).filter_map(look).collect();
-        Truths { camera: &self.reach.camera, ray: self.ray, trial, looked }
+        Truths::new(self.reach, self.ray, trial, phases)
     }
 }
 
@@ -244,6 +267,17 @@ impl Looked {
 }
 
 impl<'a> Truths<'a> {
+    fn new(reach: &'a LensReach, ray: RayStage, trial: Trial<'a>, phases: &[f64]) -> Self {
+        let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
+        let looked = reach.probes.par_iter().enumerate().with_min_len(16).filter_map(look).collect();
+        Truths { camera: &reach.camera, ray, trial, looked }
+    }
+
+    /// At mid-exposure alone: for what silhouettes there are.
+    pub fn of_silhouettes(reach: &'a LensReach, trial: Trial<'a>) -> Self {
+        Self::new(reach, RayStage::Pinhole, trial, &PHASES[..1])
+    }
+
     /// Largest displacement of a source by the level of detail.
     fn level_of_detail_px(&self, detail: Option<&TerrainDetail<'_>>) -> f64 {
         self.largest(|_, looked| self.trial.level_of_detail_px(&looked.truth, detail))
@@ -262,7 +296,8 @@ impl<'a> Truths<'a> {
         *looked.apart.get_or_init(|| self.trial.at_silhouette(&looked.probe, &looked.truth, false))
     }
 
-    fn silhouette_share(&self) -> f64 {
+    /// Share of the pixels at silhouettes: of one probe in [`SHARE_STEP`].
+    pub fn silhouette_share(&self) -> f64 {
         let asked: Vec<&Looked> = self.looked.iter().step_by(SHARE_STEP).collect();
         let apart = asked.par_iter().with_min_len(8).filter(|looked| self.trial.at_silhouette(&looked.probe, &looked.truth, true)).count();
         apart as f64 / asked.len().max(1) as f64

@@ -41,6 +41,8 @@ pub struct Holes {
     pub width_px: f64,
     /// Share of the picture in strips wider than `quality.max_error_px`.
     pub wide_share: f64,
+    /// The same as `share`, but of a strip narrower than a pixel as much less.
+    pub narrow_share: f64,
     /// Expected error by them, RMS over the picture, 1/255 of the linear range. A strip narrower than a pixel is as much less of each that
     /// it crosses.
     pub error_dn: f64,
@@ -66,11 +68,13 @@ impl Holes {
             strips.iter().flatten().fold(0.0, |sum, strip| sum + of(strip) / strip.times) / strips.len().max(1) as f64
         };
         let share = part(&|_| 1.0);
+        let narrow_share = part(&|strip| strip.width_px.min(1.0));
         Self {
             share,
             width_px: if share > 0.0 { part(&|strip| strip.width_px) / share } else { 0.0 },
             wide_share: part(&|strip| f64::from(u8::from(strip.width_px > max_error_px))),
-            error_dn: CONTRAST_DN * part(&|strip| strip.width_px.min(1.0)).sqrt(),
+            narrow_share,
+            error_dn: CONTRAST_DN * narrow_share.sqrt(),
         }
     }
 }

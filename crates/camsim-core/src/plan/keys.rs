@@ -65,7 +65,7 @@ pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &Q
     if let Some(count) = quality.key_frames.value() {
         return if count <= 1 { one("quality.key_frames is 1".into()) } else { count.min(MAX_KEYS) };
     }
-    let Some(Holes { share, width_px, wide_share, error_dn }) = holes else {
+    let Some(Holes { share, width_px, wide_share, error_dn, .. }) = holes else {
         return one("no silhouette is seen sample by sample".into());
     };
     if *error_dn > HOLES_SHARE * quality.max_error_dn || *wide_share > HOLES_SHARE * (1.0 - PERCENTILE) {

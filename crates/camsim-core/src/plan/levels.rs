@@ -11,7 +11,7 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, Contours, LensReach, SurfaceReads,
+    BlurStage, Contours, FramePlan, LensReach, SurfaceReads,
     exposure::ExposurePath,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
@@ -39,7 +39,8 @@ const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
-const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, 2.0];
+const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE];
+pub(super) const MOST_SCALE: f64 = 2.0;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// What is left of a tolerance and what is taken of it may add up to a little more.
@@ -83,8 +84,10 @@ pub(super) struct Sampling {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub sampling: Sampling,
-    /// Its price, bilinear reads of an output pixel; `None` where it is not within the tolerance.
-    pub within: Option<f64>,
+    /// Bilinear reads of an output pixel.
+    pub price: f64,
+    /// Whether it is within the tolerance.
+    pub within: bool,
 }
 
 /// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
@@ -202,7 +205,7 @@ impl<'a> Prospect<'a> {
     }
 
     /// The cheapest sampling within the tolerance (1/255, of an ideal frame of a scale; `None` is none), or the best there is. The scale is
-    /// not below `least_scale`, and that at which the frame does not fit is left out. `ideal_share`: pixels that the ideal frame has at scale 1 for each of the camera's.
+    /// not below `least_scale`, and that at which the frame does not fit is left out. `ideal_share`: pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
     pub fn choose(
         &self,
         quality: &QualitySpec,
@@ -220,9 +223,8 @@ impl<'a> Prospect<'a> {
             None => SAMPLES_PER_PX.iter().map(|samples| samples / scale).collect(),
         };
         let way = |sampling: Sampling, samples_per_px: f64| {
-            let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
-            let blur = exposure.map(|exposure| exposure.with_samples(samples_per_px, max_samples));
-            (Sampling { samples_per_px, ..sampling }, blur)
+            let sampling = Sampling { samples_per_px, ..sampling };
+            (sampling, sampling.tried(quality, exposure))
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
         let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share);
@@ -272,10 +274,19 @@ impl<'a> Prospect<'a> {
             }
         }
         if let Some((price, sampling)) = cheapest {
-            return Choice { sampling, within: Some(price) };
+            return Choice { sampling, price, within: true };
         }
         let none = Sampling { samples_per_px: 2.0, ..Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline) };
-        Choice { sampling: best.map_or(none, |(_, way)| exactly(way)), within: None }
+        let (sampling, price) = best.map_or((none, f64::INFINITY), |(_, way)| (exactly(way), cost(&way)));
+        Choice { sampling, price, within: false }
+    }
+
+    /// A way of sampling that another frame has chosen.
+    pub fn given(&self, sampling: &Sampling, quality: &QualitySpec, ideal_share: f64, exposure: Option<ExposurePath>) -> Choice {
+        let blur = sampling.tried(quality, exposure);
+        let expected = self.expected(sampling, blur);
+        let within = expected.total_dn() <= quality.max_error_dn;
+        Choice { sampling: Sampling { expected, ..*sampling }, price: self.cost(sampling, blur, ideal_share), within }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -408,9 +419,26 @@ impl Sampling {
         Self { scale, surface_reads, taps, samples_per_px: 0.0, expected: Expected::default() }
     }
 
+    /// A plan's.
+    pub fn of(plan: &FramePlan) -> Self {
+        let scale = plan.ideal.focal_px.x / plan.camera.focal_px.x;
+        Self { samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px), ..Self::new(scale, plan.surface_reads, plan.taps) }
+    }
+
     /// The paper's: one bilinear read a sample.
     pub fn of_paper() -> Self {
         Self::new(1.0, SurfaceReads::Grid, TapStage::Bilinear)
+    }
+
+    /// The same in an ideal frame so many times finer: with as many samples.
+    pub fn finer(&self, times: f64) -> Self {
+        Self { scale: times * self.scale, samples_per_px: self.samples_per_px / times, ..*self }
+    }
+
+    /// The exposure's samples where the longest path is not known yet.
+    fn tried(&self, quality: &QualitySpec, exposure: Option<ExposurePath>) -> Option<BlurStage> {
+        let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
+        exposure.map(|exposure| exposure.with_samples(self.samples_per_px, max_samples))
     }
 
     /// The exposure's samples for paths of up to `blur_px` ideal pixels.

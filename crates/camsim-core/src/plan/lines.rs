@@ -6,9 +6,9 @@ use super::{FramePlan, table_shape};
 use crate::{frame::RowRecord, mount::CameraPath, pose::CameraPose, shutter::LinesAxis};
 
 /// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`; with more than one node
-/// the mid-exposure pose follows the nodes. Of frames with several keys two more parts follow: the poses `x_mid = R x_key + t` of the
-/// keys in the mid-window camera, then an entry for each field and line with the line's mid-exposure as a share of the window in its
-/// first number.
+/// the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the mid-window camera's the poses `x_mid = R x_key + t` of the
+/// keys in that camera follow, and of frames with several keys then an entry for each field and line with the line's mid-exposure as a share of
+/// the window in its first number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinePoses {
     /// Rows of `(R | t)`.
@@ -40,8 +40,10 @@ pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
         entries.extend(of_key);
         stride = stride_of_key;
     }
-    if plan.keys.len() > 1 {
+    if plan.keys.len() > 1 || plan.looks_from_elsewhere() {
         entries.extend(plan.keys.iter().map(|key| relative(&key.pose, &plan.key_pose)));
+    }
+    if plan.keys.len() > 1 {
         entries.extend(lines_of(plan).map(|(field, line)| {
             let share = plan.window_share(plan.stamp_s + line_dt_s(plan, field, line));
             [[share as f32, 0.0, 0.0, 0.0], [0.0; 4], [0.0; 4]]

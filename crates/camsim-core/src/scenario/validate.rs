@@ -11,6 +11,8 @@ pub const MAX_ITERATIONS: u32 = 64;
 pub const MAX_BLUR_SAMPLES: u32 = 4096;
 /// Most reads along a side of a pixel; the planner takes 4 at most.
 pub const MAX_FOOTPRINT_TAPS: u32 = 64;
+/// Most output frames of one ideal frame.
+pub const MAX_FRAMES_PER_IDEAL: u32 = 64;
 
 /// One value that no run can use.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -226,6 +228,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
     check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=4.0).contains(&scale)), "quality.ideal_scale", || {
         "must be 1 to 4 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
+    });
+    check.require((1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal), "quality.frames_per_ideal", || {
+        format!("must be 1 (each frame its own) to {MAX_FRAMES_PER_IDEAL}, not {}; 8 is the default", quality.frames_per_ideal)
     });
     check.require(quality.key_frames.value().is_none_or(|frames| (1..=MAX_KEYS).contains(&frames)), "quality.key_frames", || {
         format!("must be 1 to {MAX_KEYS} ideal frames for each output frame, or \"auto\"")

@@ -3,6 +3,7 @@
 
 use std::{
     collections::VecDeque,
+    iter::Peekable,
     sync::{
         Arc, Mutex, PoisonError,
         mpsc::{Receiver, TryRecvError, channel},
@@ -20,8 +21,10 @@ use camsim_core::{
 use super::ms_since;
 use crate::ideal::base_ned_m;
 
-/// Frames that are prepared before they are asked for, at most. Each is some megabytes of triangles and poses.
+/// Frames that are prepared before they are asked for, at most, where each is planned by itself. Each is some megabytes of triangles and poses.
 const MOST_AHEAD: usize = 4;
+/// Frames of one group that one thread prepares, at most: as many are ready while as many are begun.
+const MOST_TOGETHER: usize = 16;
 
 /// A frame before anything of it is recorded.
 #[derive(Debug)]
@@ -111,17 +114,19 @@ impl Preparer {
 }
 
 /// Frames in the order asked for, each begun before it is taken.
-pub(super) struct Ahead<'a, 'scope, I> {
+pub(super) struct Ahead<'a, 'scope, I: Iterator<Item = u64>> {
     scope: &'a rayon::Scope<'scope>,
     preparer: &'scope Preparer,
-    frames: I,
+    frames: Peekable<I>,
     begun: VecDeque<Receiver<Result<Prepared, PlanError>>>,
+    /// Frames of the last group.
+    together: usize,
 }
 
 impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
     /// Begins with the first frames. The scope ends when those that have been begun are done.
     pub fn start(scope: &'a rayon::Scope<'scope>, preparer: &'scope Preparer, frames: I) -> Self {
-        let mut ahead = Self { scope, preparer, frames, begun: VecDeque::new() };
+        let mut ahead = Self { scope, preparer, frames: frames.peekable(), begun: VecDeque::new(), together: 0 };
         ahead.begin();
         ahead
     }
@@ -135,18 +140,39 @@ impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
         Some(prepared)
     }
 
+    /// The next frames that are planned together.
+    fn next_group(&mut self) -> Vec<u64> {
+        let planner = &self.preparer.planner;
+        let mut frames: Vec<u64> = self.frames.next().into_iter().collect();
+        let Some(number) = frames.first().map(|&frame| planner.group_of(frame)) else { return frames };
+        while frames.len() < MOST_TOGETHER
+            && let Some(frame) = self.frames.next_if(|&frame| planner.group_of(frame) == number)
+        {
+            frames.push(frame);
+        }
+        frames
+    }
+
     fn begin(&mut self) {
         // One to be taken and one at work at least; more where there are threads for it.
         let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
-        while self.begun.len() < ahead {
-            let Some(frame) = self.frames.next() else { return };
-            let (give, given) = channel();
+        while self.begun.len() < ahead.max(self.together) {
+            let group = self.next_group();
+            if group.is_empty() {
+                return;
+            }
+            self.together = group.len();
+            let (gives, given): (Vec<_>, Vec<_>) = group.iter().map(|_| channel()).unzip();
             let preparer = self.preparer;
             self.scope.spawn(move |_| {
-                // After a fault nobody takes it.
-                let _ = give.send(preparer.prepare(frame));
+                for (frame, give) in group.into_iter().zip(gives) {
+                    // After a fault nobody takes it.
+                    if give.send(preparer.prepare(frame)).is_err() {
+                        return;
+                    }
+                }
             });
-            self.begun.push_back(given);
+            self.begun.extend(given);
         }
     }
 }

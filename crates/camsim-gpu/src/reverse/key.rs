@@ -38,6 +38,17 @@ impl From<TapStage> for TapKind {
     }
 }
 
+/// What the ideal frames are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum KeyKind {
+    /// One: the mid-window camera, or any where nobody asks for coordinates.
+    Single,
+    /// One at another instant.
+    Elsewhere,
+    /// Several.
+    Several,
+}
+
 /// Rays of their own at silhouettes, without their numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum EdgeKind {
@@ -74,8 +85,8 @@ pub struct PipelineKey {
     pub path: PathStage,
     /// What reads the ideal frame.
     pub tap: TapKind,
-    /// More than one ideal frame.
-    pub keys: bool,
+    /// What the ideal frames are of.
+    pub keys: KeyKind,
     /// Rays of their own at silhouettes.
     pub edges: EdgeKind,
     /// Depth and coordinates beside the picture.
@@ -102,7 +113,11 @@ impl PipelineKey {
             depths: plan.blur.map_or(NodeDepths::Each, |blur| blur.depths),
             path: plan.blur.map_or(PathStage::Straight, |blur| blur.path),
             tap: plan.taps.into(),
-            keys: plan.keys.len() > 1,
+            keys: match temporal {
+                _ if plan.keys.len() > 1 => KeyKind::Several,
+                TemporalKind::Rotation | TemporalKind::Reproject if plan.truth && plan.looks_from_elsewhere() => KeyKind::Elsewhere,
+                _ => KeyKind::Single,
+            },
             edges: plan.edges.into(),
             truth: plan.truth,
             paper: plan.preset == Preset::Paper,
@@ -123,11 +138,12 @@ impl PipelineKey {
                     }
                     // Without parallax all key cameras see the same.
                     let parallax = temporal == TemporalKind::Reproject;
-                    for (several, edges) in [false, true]
+                    for (key_kind, edges) in [KeyKind::Single, KeyKind::Elsewhere, KeyKind::Several]
                         .into_iter()
-                        .flat_map(|several| [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (several, edges)))
+                        .flat_map(|kind| [EdgeKind::None, EdgeKind::Centres, EdgeKind::Samples].map(|edges| (kind, edges)))
                     {
-                        if several && !parallax {
+                        let has_poses = parallax || temporal == Rotation;
+                        if key_kind == KeyKind::Several && !parallax || key_kind == KeyKind::Elsewhere && !has_poses {
                             continue;
                         }
                         let looks_up = blur && temporal == Reproject;
@@ -137,14 +153,15 @@ impl PipelineKey {
                             .filter(|&(depths, path)| looks_up || depths == NodeDepths::Each && (blur || path == PathStage::Straight));
                         for (depths, path) in exposures {
                             for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
-                                keys.extend([false, true].map(|truth| Self {
+                                let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
+                                keys.extend(truths.iter().map(|&truth| Self {
                                     ray,
                                     temporal,
                                     blur,
                                     depths,
                                     path,
                                     tap,
-                                    keys: several,
+                                    keys: key_kind,
                                     edges,
                                     truth,
                                     paper: false,
@@ -164,7 +181,7 @@ impl PipelineKey {
                     depths: NodeDepths::Each,
                     path: PathStage::Straight,
                     tap: TapKind::Bilinear,
-                    keys: false,
+                    keys: KeyKind::Single,
                     edges: EdgeKind::None,
                     truth,
                     paper: true,
@@ -189,7 +206,11 @@ impl PipelineKey {
             TemporalKind::Linear => "reverse/temporal_inverse/linear.wgsl",
             TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
         };
-        let keys = if self.keys { "reverse/keys/several.wgsl" } else { "reverse/keys/single.wgsl" };
+        let keys = match self.keys {
+            KeyKind::Single => "reverse/keys/single.wgsl",
+            KeyKind::Elsewhere => "reverse/keys/elsewhere.wgsl",
+            KeyKind::Several => "reverse/keys/several.wgsl",
+        };
         let gather = match (self.blur, self.paper) {
             (false, _) => "reverse/gather/sharp.wgsl",
             (true, false) => "reverse/gather/blur.wgsl",

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     plan::MAX_KEYS,
-    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_ITERATIONS, MAX_SIDE_PX},
+    scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
 };
 
 /// A table of keys with what belongs to it.
@@ -130,6 +130,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.footprint_taps", CountOr(MAX_FOOTPRINT_TAPS, AUTO)),
     ("quality.ideal_scale", NumberOr(AUTO)),
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
+    ("quality.frames_per_ideal", UpTo(MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),

@@ -1,0 +1,223 @@
+//! One ideal frame for several output frames. A key frame may be taken at any instant that shows what the pixels look for: from one frame to the
+//! next the camera turns and moves little, and what the temporal inverse does for the lines of one frame it does for those of the next.
+//!
+//! Frames are looked at in groups that begin at multiples of `quality.frames_per_ideal`, so that which of them share depends on the scenario alone. The
+//! ideal frame is taken in the middle of their time, wide and fine enough for all of them. Each of them is then planned as any other: from this one key frame,
+//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise each of its halves
+//! is tried, and so on. Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind them.
+
+use std::{
+    collections::VecDeque,
+    ops::Range,
+    sync::{Arc, PoisonError},
+};
+
+use rayon::prelude::*;
+
+use super::{
+    FramePlan, KeyFrame, LensReach, Motion, PlanError, Planner, Skip, bounds,
+    bounds::View,
+    levels::{MOST_SCALE, Sampling},
+};
+use crate::scenario::{Auto, Preset, Silhouettes};
+
+/// Sharing must spare this part of the time.
+const WORTH: f64 = 0.1;
+/// Largest ideal frame for several, in pixels of one for a single frame.
+const MOST_AREA: f64 = 4.0;
+/// By how much finer it may be than what the middle frame asks for, so that the others keep their tolerance too.
+const FINER: [f64; 2] = [1.0, 1.15];
+/// Groups that are remembered: frames are asked for in order, by a few threads.
+const REMEMBERED: usize = 4;
+
+/// The ideal frame of several output frames.
+#[derive(Debug)]
+pub(super) struct Common {
+    frames: Range<u64>,
+    pub key_s: f64,
+    pub view: View,
+    /// How it and the frames are sampled; `None` as long as that is to be found.
+    pub given: Option<Sampling>,
+}
+
+impl Common {
+    /// Output frames made from it.
+    pub fn count(&self) -> u64 {
+        self.frames.end - self.frames.start
+    }
+}
+
+/// Frames that were looked at together.
+#[derive(Debug)]
+struct Group {
+    number: u64,
+    first: u64,
+    /// In order; `None` where a frame is to be planned by itself.
+    plans: Vec<Option<FramePlan>>,
+}
+
+/// The groups that were asked for last.
+#[derive(Debug, Default)]
+pub(super) struct Recent(VecDeque<Arc<Group>>);
+
+impl Planner {
+    /// Number of the group of a frame: frames of one are best planned one after the other, by the same thread.
+    #[must_use]
+    pub fn group_of(&self, frame: u64) -> u64 {
+        if self.may_share() { frame / u64::from(self.sequence.scenario.quality.frames_per_ideal) } else { frame }
+    }
+
+    /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
+    pub(super) fn shared_plan(&self, frame: u64) -> Result<Option<FramePlan>, PlanError> {
+        if !self.may_share() || frame >= self.sequence.frames {
+            return Ok(None);
+        }
+        let number = self.group_of(frame);
+        // What is kept is replaced whole: a panic elsewhere leaves nothing half done. Nobody waits for a group while holding it.
+        let recent = || self.groups.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = recent().0.iter().find(|group| group.number == number).cloned();
+        let group = match known {
+            Some(group) => group,
+            None => {
+                let group = Arc::new(self.group(number)?);
+                let mut recent = recent();
+                recent.0.push_back(group.clone());
+                if recent.0.len() > REMEMBERED {
+                    recent.0.pop_front();
+                }
+                group
+            }
+        };
+        Ok(group.plans[(frame - group.first) as usize].clone())
+    }
+
+    /// Whether the scenario leaves it to the plan how frames are made.
+    fn may_share(&self) -> bool {
+        let quality = &self.sequence.scenario.quality;
+        quality.frames_per_ideal > 1
+            && quality.preset == Preset::Default
+            && quality.solver == Auto::Auto
+            && quality.key_frames == Auto::Auto
+            && quality.silhouettes != Silhouettes::Rays
+            && self.zoom.is_none()
+    }
+
+    fn group(&self, number: u64) -> Result<Group, PlanError> {
+        let size = u64::from(self.sequence.scenario.quality.frames_per_ideal);
+        let first = number * size;
+        let frames = first..(first + size).min(self.sequence.frames);
+        let mut plans = vec![None; (frames.end - first) as usize];
+        if frames.end - first > 1 {
+            let middle = (first + frames.end) / 2;
+            let own = self.plan_from(middle, None)?;
+            if !own.edges.has_rays() {
+                self.share(frames, &own, &mut plans);
+            }
+            plans[(middle - first) as usize].get_or_insert(own);
+        }
+        Ok(Group { number, first, plans })
+    }
+
+    /// Plans `frames` from one ideal frame, or from as few as will do; `false` if none of them shares.
+    fn share(&self, frames: Range<u64>, own: &FramePlan, plans: &mut [Option<FramePlan>]) -> bool {
+        if let Some(shared) = self.shared(frames.clone(), own) {
+            plans.iter_mut().zip(shared).for_each(|(plan, shared)| *plan = Some(shared));
+            return true;
+        }
+        let half = plans.len() / 2;
+        if half < 2 {
+            return false;
+        }
+        let middle = frames.start + half as u64;
+        let (before, after) = plans.split_at_mut(half);
+        // What the first half cannot do the second hardly can.
+        self.share(frames.start..middle, own, before) && {
+            self.share(middle..frames.end, own, after);
+            true
+        }
+    }
+
+    /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
+    fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
+        let mut common = self.common(frames.clone(), own)?;
+        let middle = (frames.start + frames.end) / 2;
+        let plan = |frame: u64, common: &Common| self.plan_from(frame, Some(common)).ok().filter(|plan| is_as_good(plan, own));
+        let found = plan(middle, &common)?;
+        let sampling = Sampling::of(&found);
+        let may_be_finer = self.sequence.scenario.quality.ideal_scale == Auto::Auto;
+        let finer = FINER.into_iter().filter(|&times| times == 1.0 || may_be_finer && times * sampling.scale <= MOST_SCALE);
+        finer.map(|times| (times, sampling.finer(times))).find_map(|(times, sampling)| {
+            common.given = Some(sampling);
+            let common = &common;
+            // The outermost first: where those do not do nothing else is tried.
+            let ends = rayon::join(|| plan(frames.start, common), || plan(frames.end - 1, common));
+            let (first, last) = (ends.0?, ends.1?);
+            let known = |frame: u64| (frame == middle && times == 1.0).then(|| found.clone());
+            let between: Option<Vec<FramePlan>> =
+                (frames.start + 1..frames.end - 1).into_par_iter().map(|frame| known(frame).or_else(|| plan(frame, common))).collect();
+            let mut plans = vec![first];
+            plans.extend(between?);
+            plans.push(last);
+            let price: f64 = plans.iter().map(|plan| plan.price).sum();
+            (price < (1.0 - WORTH) * own.price * plans.len() as f64).then(|| together(plans))
+        })
+    }
+
+    /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth it.
+    fn common(&self, frames: Range<u64>, own: &FramePlan) -> Option<Common> {
+        let reach: &LensReach = self.fixed.as_ref()?;
+        let path = &*self.sequence.path;
+        let (begin_s, end_s) = self.shutter.window_s();
+        let key_s = 0.5 * (self.stamp_s(frames.start) + begin_s + self.stamp_s(frames.end - 1) + end_s);
+        let keys = [KeyFrame { t_s: key_s, pose: path.pose(key_s) }];
+        let view = |frame: u64| bounds::view(reach, path, &self.shutter, self.stamp_s(frame), key_s, &keys, &self.surfaces, None);
+        let view = frames.clone().map(view).reduce(View::and)?;
+        let scale = own.ideal.focal_px.x / own.camera.focal_px.x;
+        let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+        let times = area(view.pixels(&reach.camera, scale).size_px) / area(own.ideal.size_px);
+        let count = (frames.end - frames.start) as f64;
+        (times < MOST_AREA && times < (1.0 - WORTH) * count).then_some(Common { frames, key_s, view, given: None })
+    }
+}
+
+/// Whether a frame from a common ideal frame keeps what one from its own does.
+fn is_as_good(plan: &FramePlan, own: &FramePlan) -> bool {
+    let (here, there) = (&plan.predicted, &own.predicted);
+    let squares = |plan: &FramePlan| {
+        let predicted = &plan.predicted;
+        let plain_dn = predicted.plain_silhouettes.map_or(0.0, |plain| plain.error_dn);
+        [predicted.resampling_dn, predicted.blur_dn, plain_dn].iter().map(|dn| dn * dn).sum::<f64>()
+    };
+    !plan.edges.has_rays()
+        && (here.kept || !there.kept && here.total_px <= there.total_px)
+        && (here.levels_kept || !there.levels_kept && squares(plan) <= squares(own))
+}
+
+/// Plans from one ideal frame: what that is made by is the strictest of all.
+fn together(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
+    let (Some(first), Some(last)) = (plans.first().map(|plan| plan.frame), plans.last().map(|plan| plan.frame)) else { return plans };
+    let terrain_error_px = plans.iter().map(|plan| plan.terrain_error_px).fold(f64::INFINITY, f64::min);
+    let motion = plans.iter().map(|plan| plan.motion).reduce(Motion::and).unwrap_or_default();
+    for plan in &mut plans {
+        plan.shared_by = Some([first, last]);
+        plan.terrain_error_px = terrain_error_px;
+        plan.motion = motion;
+        plan.skipped.push(Skip { what: "ideal frame of its own", reason: format!("frames {first} to {last} are made from one") });
+    }
+    plans
+}
+
+impl Motion {
+    /// Bounds on both.
+    fn and(self, other: Self) -> Self {
+        Self {
+            nearest_m: self.nearest_m.min(other.nearest_m),
+            travel_m: self.travel_m.max(other.travel_m),
+            rotation_rad: self.rotation_rad.max(other.rotation_rad),
+            parallax_px: self.parallax_px.max(other.parallax_px),
+            rotation_px: self.rotation_px.max(other.rotation_px),
+            blur_px: self.blur_px.max(other.blur_px),
+            blur_sagitta_px: self.blur_sagitta_px.max(other.blur_sagitta_px),
+        }
+    }
+}
