@@ -151,7 +151,8 @@ fn the_first_fault_stops_everything_and_the_session_goes_on() {
         assert!(matches!(outcome, Err(RenderError::Sink(Full(frame))) if frame == full_at), "{outcome:?}");
         assert!(came.iter().copied().eq(0..=full_at), "{came:?}");
         let begun = planned.load(Ordering::Relaxed);
-        assert!(begun <= full_at + 7, "{begun} frames were begun for {full_at}");
+        // Two groups of eight that share an ideal frame, and the next frame.
+        assert!(begun <= full_at + 17, "{begun} frames were begun for {full_at}");
     }
     // A plan that fails: the frames before it are handed over first.
     let mut sequence = Sequence::clone(&plain(true));

@@ -146,21 +146,27 @@ impl Planner {
         let sampling = Sampling::of(&found);
         let may_be_finer = self.sequence.scenario.quality.ideal_scale == Auto::Auto;
         let finer = FINER.into_iter().filter(|&times| times == 1.0 || may_be_finer && times * sampling.scale <= MOST_SCALE);
-        finer.map(|times| (times, sampling.finer(times))).find_map(|(times, sampling)| {
-            common.given = Some(sampling);
+        for times in finer {
+            common.given = Some(sampling.finer(times));
             let common = &common;
             // The outermost first: where those do not do nothing else is tried.
-            let ends = rayon::join(|| plan(frames.start, common), || plan(frames.end - 1, common));
-            let (first, last) = (ends.0?, ends.1?);
+            let (first, last) = rayon::join(|| self.plan_from(frames.start, Some(common)), || self.plan_from(frames.end - 1, Some(common)));
+            // What silhouettes cost hardly depends on the scale.
+            let (first, last) = (first.ok()?, last.ok()?);
+            if !is_as_good(&first, own) || !is_as_good(&last, own) {
+                continue;
+            }
             let known = |frame: u64| (frame == middle && times == 1.0).then(|| found.clone());
             let between: Option<Vec<FramePlan>> =
                 (frames.start + 1..frames.end - 1).into_par_iter().map(|frame| known(frame).or_else(|| plan(frame, common))).collect();
-            let mut plans = vec![first];
-            plans.extend(between?);
-            plans.push(last);
+            let Some(between) = between else { continue };
+            let plans: Vec<FramePlan> = [vec![first], between, vec![last]].concat();
             let price: f64 = plans.iter().map(|plan| plan.price).sum();
-            (price < (1.0 - WORTH) * own.price * plans.len() as f64).then(|| together(plans))
-        })
+            if price < (1.0 - WORTH) * own.price * plans.len() as f64 {
+                return Some(together(plans));
+            }
+        }
+        None
     }
 
     /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth it.

@@ -1,0 +1,143 @@
+//! Several output frames from one ideal frame: drawn once, right in every pixel's source, and the same frames in any order.
+
+mod common;
+
+use std::{convert::Infallible, sync::Arc};
+
+use camsim_core::{
+    plan::{FramePlan, Planner, TemporalStage},
+    reference::{Oracle, coord_errors},
+    scenario::{Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
+    sequence::Sequence,
+};
+use camsim_gpu::{Engine, engine::Finished};
+use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
+use glam::DVec3;
+
+const ALL: [Channel; 3] = [Channel::Color, Channel::Coords, Channel::Depth];
+/// Two groups.
+const FRAMES: u64 = 16;
+
+/// Over a pattern, with every effect that moves a pixel's source.
+fn flight(velocity_ned_m_s: DVec3, rate_rad_s: DVec3, frames_per_ideal: u32) -> Arc<Sequence> {
+    let mut scenario = scenario();
+    scenario.camera.size_px = [160, 120];
+    scenario.camera.focal_px = [130.0, 130.0];
+    scenario.camera.fps = 30.0;
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, -60.0, 0.0], ..MountSpec::default() };
+    scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
+    scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
+    scenario.quality.frames_per_ideal = frames_per_ideal;
+    let mut sequence = Sequence::clone(&sequence(scenario, steady(80.0, 0.0, velocity_ned_m_s, rate_rad_s), pattern(800.0)));
+    sequence.frames = FRAMES;
+    Arc::new(sequence)
+}
+
+fn flights() -> [(&'static str, Arc<Sequence>); 2] {
+    let turn = DVec3::new(0.1, -0.05, 0.2);
+    [("flown past", flight(DVec3::new(9.0, 2.0, -1.0), turn, 8)), ("turned", flight(DVec3::ZERO, turn, 8))]
+}
+
+fn rendered(engine: &Engine, sequence: &Arc<Sequence>, channels: &[Channel], frames: impl IntoIterator<Item = u64>) -> Vec<Finished> {
+    let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
+    assert!(session.time_passes(), "software adapters have time stamps");
+    let mut done = Vec::new();
+    let mut keep = |finished| {
+        done.push(finished);
+        Ok(())
+    };
+    session.render::<Infallible>(frames, &mut keep).expect("render");
+    done
+}
+
+fn is_drawn(done: &Finished) -> bool {
+    done.times.passes.iter().any(|pass| pass.name == "ideal")
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_group_is_drawn_once_and_every_frame_of_it_is_right() {
+    let engine = engine();
+    for (name, sequence) in flights() {
+        let plain = rendered(&engine, &sequence, &[Channel::Color], 0..FRAMES);
+        let own = flight_of_its_own(&sequence);
+        let apart = rendered(&engine, &own, &[Channel::Color], 0..FRAMES);
+        assert_eq!(plain.iter().filter(|done| is_drawn(done)).count(), 2, "{name}");
+        assert_eq!(apart.iter().filter(|done| is_drawn(done)).count(), FRAMES as usize, "{name}");
+        for frame in [0, 3, 7, 8, 15] {
+            let group = frame / 8 * 8;
+            let first = &plain[frame as usize];
+            assert_eq!((first.plan.shared_by, first.plan.looks_from_elsewhere()), (Some([group, group + 7]), true), "{name}");
+            for phase in [0.0, -0.5] {
+                let done = render_at_phase(&engine, &sequence, &ALL, frame, phase);
+                assert!(done.frame.color_rgba == first.frame.color_rgba, "{name}, {frame}: asking for the truth changes no colour");
+                let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+                let errors = coord_errors(&oracle, &done.plan, &done.frame, f64::from(phase), 1).expect("coords were asked for");
+                let p99_px = errors.all.p99_px;
+                assert!(errors.falsely_valid == 0 && errors.missing == 0 && errors.all.count > 19_000, "{name}, {frame}: {errors:?}");
+                assert!(p99_px <= done.plan.predicted.total_px && done.plan.predicted.kept, "{name}, {frame}: {errors:?}");
+            }
+            let off_dn = rms_dn(first, &apart[frame as usize]);
+            eprintln!(
+                "{name}, {frame}: {:?}, predicted {:.1e} px, {off_dn:.2}/255 from its own",
+                first.plan.temporal, first.plan.predicted.total_px
+            );
+            // Each of them is within 1/255.
+            assert!(off_dn < 2_f64.sqrt(), "{name}, {frame}: {off_dn}");
+        }
+        let stages: Vec<TemporalStage> = plain.iter().map(|done| done.plan.temporal).collect();
+        assert_eq!(stages.contains(&TemporalStage::Rotation), name == "turned", "{stages:?}");
+    }
+}
+
+fn flight_of_its_own(sequence: &Sequence) -> Arc<Sequence> {
+    let mut own = sequence.clone();
+    own.scenario.quality.frames_per_ideal = 1;
+    Arc::new(own)
+}
+
+/// RMS difference, 1/255 of the linear range.
+fn rms_dn(a: &Finished, b: &Finished) -> f64 {
+    let squares: f64 = a.frame.color_rgba.iter().zip(&b.frame.color_rgba).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    255.0 * (squares / (0.75 * a.frame.color_rgba.len() as f64)).sqrt()
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn who_shares_depends_on_the_scenario_alone() {
+    let engine = engine();
+    let (_, sequence) = &flights()[0];
+    let in_order = rendered(&engine, sequence, &[Channel::Color], 0..FRAMES);
+    let shuffled = [9, 2, 15, 2, 7, 8, 0];
+    for (frame, done) in shuffled.into_iter().zip(rendered(&engine, sequence, &[Channel::Color], shuffled)) {
+        assert!(done.frame.color_rgba == in_order[frame as usize].frame.color_rgba, "{frame}");
+    }
+    let text = |plan: &FramePlan| format!("{plan:?}");
+    let planner = Planner::new(sequence.clone(), &[Channel::Color], engine.gpu().max_side_px()).expect("a planner");
+    for frame in [15, 4, 11, 4] {
+        assert_eq!(text(&planner.plan(frame).expect("a plan")), text(&in_order[frame as usize].plan));
+    }
+}
+
+#[test]
+fn what_moves_too_far_is_not_shared() {
+    let group = |sequence: &Arc<Sequence>| {
+        let planner = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner");
+        planner.plan(5).expect("a plan").shared_by
+    };
+    let turning = |deg_s: f64| flight(DVec3::ZERO, DVec3::new(0.0, 0.0, deg_s.to_radians()), 8);
+    assert_eq!(group(&turning(20.0)), Some([0, 7]));
+    // 130 deg within eight frames.
+    let fast = group(&turning(500.0));
+    assert!(fast.is_none_or(|[first, last]| last - first < 4), "{fast:?}");
+    assert_eq!(group(&flight(DVec3::ZERO, DVec3::ZERO, 1)), None);
+    // The last group is as long as the flight.
+    let mut short = Sequence::clone(&turning(20.0));
+    short.frames = 6;
+    assert_eq!(group(&Arc::new(short)), Some([0, 5]));
+    // A single frame of a flight has nothing to share.
+    let mut single = Sequence::clone(&turning(20.0));
+    single.frames = 6;
+    single.scenario.quality.frames_per_ideal = 5;
+    assert_eq!(group(&Arc::new(single)), None);
+}
