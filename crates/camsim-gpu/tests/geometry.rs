@@ -107,6 +107,8 @@ fn check(name: &str, scenario: Scenario, trajectory: Trajectory) {
 fn with(shutter: ShutterSpec, change: impl FnOnce(&mut CameraSpec)) -> Scenario {
     let mut scenario = scenario();
     scenario.quality.max_error_px = 1e-3;
+    // What several frames make of one: sharing.rs.
+    scenario.quality.frames_per_ideal = 1;
     scenario.camera.size_px = [320, 240];
     scenario.camera.focal_px = [250.0, 240.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };

@@ -295,6 +295,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 1196 + 504);
+        assert_eq!(PipelineKey::all().len(), 1448);
     }
 }

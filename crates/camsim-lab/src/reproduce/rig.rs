@@ -9,7 +9,7 @@ use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
     reference::Oracle,
-    scenario::{CameraSpec, Channel, FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
+    scenario::{CameraSpec, Channel, FlightSpec, LensModel, LensSpec, MountSpec, QualitySpec, Scenario, ShutterSpec},
     scene::Scene,
     sequence::Sequence,
     shutter::Shutter,
@@ -120,7 +120,8 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
         tracker: Default::default(),
         camera,
         scene: Default::default(),
-        quality: Default::default(),
+        // Pictures of one instant each: there is nothing to share.
+        quality: QualitySpec { frames_per_ideal: 1, ..QualitySpec::default() },
         output: Default::default(),
     }
 }
