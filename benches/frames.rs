@@ -27,8 +27,8 @@ mod flight;
 
 use flight::{Outcome, Without};
 
-/// Frames of a burst: enough for two in flight to pay, few enough for many rounds.
-const BURST: u64 = 4;
+/// Frames of a burst: as many as may share an ideal frame.
+const BURST: u64 = 8;
 /// Rounds, unless time runs out before.
 const ROUNDS: usize = 25;
 /// Pictures of larger sides are in tiles, where that is measured.
@@ -120,13 +120,15 @@ fn measure(variants: &mut [Variant<'_>], frames: u64, measuring: bool) -> Outcom
             break;
         }
         let burst = if measuring { BURST } else { 1 };
-        let first = (round as u64 * BURST) % (frames - BURST);
+        let first = (round as u64 * BURST) % (frames / BURST * BURST);
         // Each variant takes each place in the round once in a while.
         let count = variants.len();
         for place in 0..count {
             let variant = &mut variants[(place + round) % count];
             if variant.still {
                 render(&mut variant.session, [first])?;
+            } else {
+                variant.session.forget();
             }
             let busy = processor_ms();
             let begin = Instant::now();

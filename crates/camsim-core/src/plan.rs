@@ -358,7 +358,7 @@ impl Planner {
             let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
             let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale * frames_per_ideal);
             let exposure = exposed(&motion, &ideal).path(quality, &mut Vec::new());
-            let max_error_dn = quality.max_error_dn;
+            let max_error_dn = quality.max_error_dn * common.map_or(1.0, |common| common.share_of_dn);
             let choose = |tolerance_dn: &dyn Fn(f64) -> Option<f64>| {
                 prospect.choose(quality, tolerance_dn, least_scale, ideal_share, exposure, fits)
             };

@@ -254,6 +254,13 @@ impl Session<'_> {
         self.slots.iter().all(|slot| slot.clock.is_some())
     }
 
+    /// Forgets what was planned and drawn last, so that the next frame takes as long as if no other had been like it. No picture changes: for
+    /// benchmarks, which render the same frames over and over.
+    pub fn forget(&mut self) {
+        self.drawn = None;
+        self.planner.forget();
+    }
+
     /// Renders frames in the order asked for and hands each to `sink`. While the host takes a frame, the device works on the next, and
     /// other threads plan those that follow; `frames` is read ahead of them.
     ///

@@ -10,7 +10,7 @@ use camsim_gpu::{Engine, GpuError, RenderError};
 use serde::Serialize;
 
 use crate::{
-    cases::{Case, CaseError, cases},
+    cases::{Case, CaseError, FRAMES, cases},
     plot::PlotError,
 };
 
@@ -165,8 +165,8 @@ pub fn run<E: From<BenchError>>(engine: &Engine, options: &Options, watch: &mut 
 fn effort(quick: bool) -> Effort {
     use std::time::Duration;
     match quick {
-        true => Effort { burst: 2, min_rounds: 3, max_rounds: 5, budget: Duration::from_secs(4) },
-        false => Effort { burst: 2, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(6) },
+        true => Effort { burst: FRAMES, min_rounds: 3, max_rounds: 5, budget: Duration::from_secs(4) },
+        false => Effort { burst: FRAMES, min_rounds: 3, max_rounds: 15, budget: Duration::from_secs(6) },
     }
 }
 

@@ -23,8 +23,8 @@ use world::{World, vignette};
 const SEED: u64 = 12;
 /// Focal length at 640x480, pixels: the wide camera of the paper's experiments.
 const FOCAL_PX: f64 = 307.6075;
-/// Frames of a sequence: few, so that no motion leaves its scene.
-pub const FRAMES: u64 = 8;
+/// Frames of a sequence, and of a burst: few, so that no motion leaves its scene.
+pub const FRAMES: u64 = 4;
 /// The camera coasts from this long before frame 0 to this long after, seconds.
 const SPAN_S: f64 = 60.0;
 

@@ -430,11 +430,6 @@ impl Sampling {
         Self::new(1.0, SurfaceReads::Grid, TapStage::Bilinear)
     }
 
-    /// The same in an ideal frame so many times finer: with as many samples.
-    pub fn finer(&self, times: f64) -> Self {
-        Self { scale: times * self.scale, samples_per_px: self.samples_per_px / times, ..*self }
-    }
-
     /// The exposure's samples where the longest path is not known yet.
     fn tried(&self, quality: &QualitySpec, exposure: Option<ExposurePath>) -> Option<BlurStage> {
         let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);

@@ -14,19 +14,15 @@ use std::{
 
 use rayon::prelude::*;
 
-use super::{
-    FramePlan, KeyFrame, LensReach, Motion, PlanError, Planner, Skip, bounds,
-    bounds::View,
-    levels::{MOST_SCALE, Sampling},
-};
+use super::{FramePlan, KeyFrame, LensReach, Motion, PlanError, Planner, Skip, bounds, bounds::View, levels::Sampling};
 use crate::scenario::{Auto, Preset, Silhouettes};
 
 /// Sharing must spare this part of the time.
 const WORTH: f64 = 0.1;
 /// Largest ideal frame for several, in pixels of one for a single frame.
 const MOST_AREA: f64 = 4.0;
-/// By how much finer it may be than what the middle frame asks for, so that the others keep their tolerance too.
-const FINER: [f64; 2] = [1.0, 1.15];
+/// Parts of `quality.max_error_dn` that the middle frame is sampled for, so that the others keep all of it.
+const SHARES: [f64; 2] = [1.0, 0.85];
 /// Groups that are remembered: frames are asked for in order, by a few threads.
 const REMEMBERED: usize = 4;
 
@@ -36,6 +32,8 @@ pub(super) struct Common {
     frames: Range<u64>,
     pub key_s: f64,
     pub view: View,
+    /// Part of `quality.max_error_dn` that it is sampled for.
+    pub share_of_dn: f64,
     /// How it and the frames are sampled; `None` as long as that is to be found.
     pub given: Option<Sampling>,
 }
@@ -65,6 +63,11 @@ impl Planner {
     #[must_use]
     pub fn group_of(&self, frame: u64) -> u64 {
         if self.may_share() { frame / u64::from(self.sequence.scenario.quality.frames_per_ideal) } else { frame }
+    }
+
+    /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
+    pub fn forget(&self) {
+        self.groups.lock().unwrap_or_else(PoisonError::into_inner).0.clear();
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -142,12 +145,10 @@ impl Planner {
         let mut common = self.common(frames.clone(), own)?;
         let middle = (frames.start + frames.end) / 2;
         let plan = |frame: u64, common: &Common| self.plan_from(frame, Some(common)).ok().filter(|plan| is_as_good(plan, own));
-        let found = plan(middle, &common)?;
-        let sampling = Sampling::of(&found);
-        let may_be_finer = self.sequence.scenario.quality.ideal_scale == Auto::Auto;
-        let finer = FINER.into_iter().filter(|&times| times == 1.0 || may_be_finer && times * sampling.scale <= MOST_SCALE);
-        for times in finer {
-            common.given = Some(sampling.finer(times));
+        for share_of_dn in SHARES {
+            (common.share_of_dn, common.given) = (share_of_dn, None);
+            let found = plan(middle, &common)?;
+            common.given = Some(Sampling::of(&found));
             let common = &common;
             // The outermost first: where those do not do nothing else is tried.
             let (first, last) = rayon::join(|| self.plan_from(frames.start, Some(common)), || self.plan_from(frames.end - 1, Some(common)));
@@ -156,7 +157,7 @@ impl Planner {
             if !is_as_good(&first, own) || !is_as_good(&last, own) {
                 continue;
             }
-            let known = |frame: u64| (frame == middle && times == 1.0).then(|| found.clone());
+            let known = |frame: u64| (frame == middle).then(|| found.clone());
             let between: Option<Vec<FramePlan>> =
                 (frames.start + 1..frames.end - 1).into_par_iter().map(|frame| known(frame).or_else(|| plan(frame, common))).collect();
             let Some(between) = between else { continue };
@@ -182,7 +183,7 @@ impl Planner {
         let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
         let times = area(view.pixels(&reach.camera, scale).size_px) / area(own.ideal.size_px);
         let count = (frames.end - frames.start) as f64;
-        (times < MOST_AREA && times < (1.0 - WORTH) * count).then_some(Common { frames, key_s, view, given: None })
+        (times < MOST_AREA && times < (1.0 - WORTH) * count).then_some(Common { frames, key_s, view, share_of_dn: 1.0, given: None })
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! A machine is never quite idle, so what is compared is measured in the same rounds: each round renders a burst of frames with every
 //! variant. A time a frame is that of a burst, two frames in flight, divided by its frames: plan, poses, passes and read-back are in it,
-//! files are not.
+//! files are not. What the frames of a burst share, such as one ideal frame, is planned and drawn anew in each.
 //!
 //! The time for all of it is shared out evenly: a variant leaves when it has used its share, so that slow ones have few rounds and quick ones
 //! many. Rounds that two variants have in common are the first ones of both.
@@ -120,21 +120,24 @@ pub fn measure(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effo
         let finished = render(&mut session, [if *still { 0 } else { FRAME }])?;
         let burst = if begin.elapsed() - before_first > SLOW { 1 } else { effort.burst };
         let times = Times { start_s: begin.elapsed().as_secs_f64(), ..Times::default() };
-        let frames = (0..).map(move |k| if *still { 0 } else { (FRAME + 1 + k) % sequence.frames.max(1) });
-        running.push((session, frames, burst, Measured { times, finished }));
+        let frames = (0..).map(move |k| if *still { 0 } else { k % sequence.frames.max(1) });
+        running.push((session, frames, *still, burst, Measured { times, finished }));
     }
     let count = running.len();
     for round in 0..effort.max_rounds {
         let mut any = false;
         // Each variant takes each place in the round once in a while.
         for place in 0..count {
-            let (session, frames, burst, Measured { times, .. }) = &mut running[(place + round) % count];
+            let (session, frames, still, burst, Measured { times, .. }) = &mut running[(place + round) % count];
             let a_frame = |sum_ms: f64| sum_ms / *burst as f64;
             if !effort.goes_on(round, *burst as f64 * times.wall_ms.iter().sum::<f64>(), count) {
                 continue;
             }
             any = true;
             let frames: Vec<u64> = frames.take(*burst as usize).collect();
+            if !*still {
+                session.forget();
+            }
             let busy = processor_ms();
             let begin = Instant::now();
             render(session, frames)?;
