@@ -21,7 +21,7 @@ use crate::scenario::{Auto, Preset, Silhouettes};
 const WORTH: f64 = 0.1;
 /// Largest ideal frame for several, in pixels of one for a single frame.
 const MOST_AREA: f64 = 4.0;
-/// Parts of `quality.max_error_dn` that the middle frame is sampled for, so that the others keep all of it.
+/// Parts of `quality.max_error_dn` that the first frame is sampled for, so that the others keep all of it.
 const SHARES: [f64; 2] = [1.0, 0.85];
 /// Groups that are remembered: frames are asked for in order, by a few threads.
 const REMEMBERED: usize = 4;
@@ -143,23 +143,20 @@ impl Planner {
     /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
     fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let mut common = self.common(frames.clone(), own)?;
-        let middle = (frames.start + frames.end) / 2;
-        let plan = |frame: u64, common: &Common| self.plan_from(frame, Some(common)).ok().filter(|plan| is_as_good(plan, own));
+        let last_frame = frames.end - 1;
+        let is_worth_it = |plan: &FramePlan| plan.price < (1.0 - WORTH) * own.price;
         for share_of_dn in SHARES {
             (common.share_of_dn, common.given) = (share_of_dn, None);
-            let found = plan(middle, &common)?;
-            common.given = Some(Sampling::of(&found));
+            // The outermost first: what they need is enough for the others, and where they fail nothing else is tried.
+            let first = self.plan_from(frames.start, Some(&common)).ok().filter(|plan| keeps_px(plan, own) && is_worth_it(plan))?;
+            common.given = Some(Sampling::of(&first));
             let common = &common;
-            // The outermost first: where those do not do nothing else is tried.
-            let (first, last) = rayon::join(|| self.plan_from(frames.start, Some(common)), || self.plan_from(frames.end - 1, Some(common)));
-            // What silhouettes cost hardly depends on the scale.
-            let (first, last) = (first.ok()?, last.ok()?);
-            if !is_as_good(&first, own) || !is_as_good(&last, own) {
+            let last = self.plan_from(last_frame, Some(common)).ok().filter(|plan| keeps_px(plan, own))?;
+            if !keeps_dn(&first, own) || !keeps_dn(&last, own) {
                 continue;
             }
-            let known = |frame: u64| (frame == middle).then(|| found.clone());
-            let between: Option<Vec<FramePlan>> =
-                (frames.start + 1..frames.end - 1).into_par_iter().map(|frame| known(frame).or_else(|| plan(frame, common))).collect();
+            let plan = |frame: u64| self.plan_from(frame, Some(common)).ok().filter(|plan| keeps_px(plan, own) && keeps_dn(plan, own));
+            let between: Option<Vec<FramePlan>> = (frames.start + 1..last_frame).into_par_iter().map(plan).collect();
             let Some(between) = between else { continue };
             let plans: Vec<FramePlan> = [vec![first], between, vec![last]].concat();
             let price: f64 = plans.iter().map(|plan| plan.price).sum();
@@ -187,17 +184,20 @@ impl Planner {
     }
 }
 
-/// Whether a frame from a common ideal frame keeps what one from its own does.
-fn is_as_good(plan: &FramePlan, own: &FramePlan) -> bool {
+/// Whether a frame from a common ideal frame keeps `quality.max_error_px`, or comes as near as one from its own does.
+fn keeps_px(plan: &FramePlan, own: &FramePlan) -> bool {
     let (here, there) = (&plan.predicted, &own.predicted);
-    let squares = |plan: &FramePlan| {
+    !plan.edges.has_rays() && (here.kept || !there.kept && here.total_px <= there.total_px)
+}
+
+/// The same of `quality.max_error_dn`.
+fn keeps_dn(plan: &FramePlan, own: &FramePlan) -> bool {
+    let square_dn = |plan: &FramePlan| {
         let predicted = &plan.predicted;
         let plain_dn = predicted.plain_silhouettes.map_or(0.0, |plain| plain.error_dn);
         [predicted.resampling_dn, predicted.blur_dn, plain_dn].iter().map(|dn| dn * dn).sum::<f64>()
     };
-    !plan.edges.has_rays()
-        && (here.kept || !there.kept && here.total_px <= there.total_px)
-        && (here.levels_kept || !there.levels_kept && squares(plan) <= squares(own))
+    plan.predicted.levels_kept || !own.predicted.levels_kept && square_dn(plan) <= square_dn(own)
 }
 
 /// Plans from one ideal frame: what that is made by is the strictest of all.
