@@ -5,7 +5,10 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     plan::{FramePlan, Predicted},
-    reference::{CoordErrors, ErrorStats, Holes, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, holes, image_errors, silhouettes},
+    reference::{
+        CoordErrors, ErrorStats, Holes, ImageErrors, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, holes, image_errors,
+        silhouettes,
+    },
     scenario::{Auto, Channel, Solver},
 };
 use camsim_gpu::{
@@ -103,6 +106,12 @@ struct Figures {
 /// PSNR in dB on linear values, peak 1; `null` where there are no pixels or no difference.
 #[derive(Serialize)]
 struct Picture {
+    /// RMS, 1/255 of the linear range, of what `quality.max_error_dn` bounds: of the whole picture where silhouettes are left as they are, otherwise without
+    /// them.
+    rms_dn: f64,
+    predicted_dn: f64,
+    /// Whether that is within the tolerance.
+    kept: bool,
     psnr_db: Option<f64>,
     smooth_psnr_db: Option<f64>,
     silhouettes_psnr_db: Option<f64>,
@@ -245,14 +254,28 @@ fn picture(oracle: &Oracle, done: &Finished) -> Picture {
     let truth = oracle.render(done.plan.frame, &RenderOptions { key: Some(key), ..RenderOptions::default() });
     let near = silhouettes(oracle, done.plan.frame, &[-0.5, 0.0, 0.5]);
     let finite = |db: f64| db.is_finite().then_some(db);
+    let predicted = &done.plan.predicted;
+    let predicted_dn = predicted.picture_dn();
+    let tolerance_dn = oracle.sequence().scenario.quality.max_error_dn;
     match image_errors(&truth, &done.frame, &near) {
         Some(errors) => Picture {
+            rms_dn: rms_dn(bounded_db(&errors, predicted)),
+            predicted_dn,
+            kept: rms_dn(bounded_db(&errors, predicted)) <= tolerance_dn,
             psnr_db: finite(errors.all_db),
             smooth_psnr_db: finite(errors.smooth_db),
             silhouettes_psnr_db: finite(errors.silhouettes_db),
             max: errors.max,
         },
-        None => Picture { psnr_db: None, smooth_psnr_db: None, silhouettes_psnr_db: None, max: f64::NAN },
+        None => Picture {
+            rms_dn: f64::NAN,
+            predicted_dn,
+            kept: false,
+            psnr_db: None,
+            smooth_psnr_db: None,
+            silhouettes_psnr_db: None,
+            max: f64::NAN,
+        },
     }
 }
 
@@ -288,16 +311,30 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
         100.0 * hole_share
     ))?;
-    if let Some(Picture { psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {
+    if let Some(Picture { rms_dn, predicted_dn, kept, psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
         console.line(format_args!(
             "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
-        // 1/255 RMS; the two estimates are independent of each other.
-        console.line(format_args!("       | estimated without silhouettes: {}", estimate(resampling_dn.hypot(*blur_dn))))?;
+        let where_ = if predicted.plain_silhouettes.is_some() { "in all" } else { "without silhouettes" };
+        let verdict = if *kept { "kept" } else { "BROKEN" };
+        console.line(format_args!(
+            "       | {where_} {rms_dn:.2}/255 (RMS), predicted {predicted_dn:.2}: quality.max_error_dn is {verdict}; without silhouettes predicted {}",
+            estimate(resampling_dn.hypot(*blur_dn))
+        ))?;
     }
     Ok(())
+}
+
+/// PSNR of the pixels that `quality.max_error_dn` bounds.
+fn bounded_db(errors: &ImageErrors, predicted: &Predicted) -> f64 {
+    if predicted.plain_silhouettes.is_some() { errors.all_db } else { errors.smooth_db }
+}
+
+/// A PSNR as RMS error in 1/255.
+fn rms_dn(psnr_db: f64) -> f64 {
+    255.0 * 10_f64.powf(-psnr_db / 20.0)
 }
 
 /// An RMS error in 1/255 as PSNR.
@@ -313,6 +350,7 @@ mod tests {
     fn no_error_is_said_in_words() {
         assert_eq!(estimate(2.55), "40.00 dB");
         assert_eq!(estimate(0.0), "no error");
+        assert!((rms_dn(40.0) - 2.55).abs() < 1e-12 && rms_dn(f64::INFINITY) == 0.0);
     }
 
     #[test]

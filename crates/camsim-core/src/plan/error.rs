@@ -98,6 +98,16 @@ pub struct Predicted {
     pub in_the_way: Option<String>,
 }
 
+impl Predicted {
+    /// What `quality.max_error_dn` bounds, all together: RMS over the picture, 1/255 of the linear range. Where silhouettes have rays of their own,
+    /// what these leave is not in it.
+    #[must_use]
+    pub fn picture_dn(&self) -> f64 {
+        let plain_dn = self.plain_silhouettes.map_or(0.0, |plain| plain.error_dn);
+        self.resampling_dn.hypot(self.blur_dn).hypot(plain_dn)
+    }
+}
+
 /// A frame whose temporal inverse is to be chosen.
 pub(super) struct Case<'a> {
     pub reach: &'a LensReach,

@@ -23,6 +23,8 @@ const WORTH: f64 = 0.1;
 const MOST_AREA: f64 = 4.0;
 /// Parts of `quality.max_error_dn` that the first frame is sampled for, so that the others keep all of it.
 const SHARES: [f64; 2] = [1.0, 0.85];
+/// From so many frames on the halves of a group are tried each for itself.
+const FAR: usize = 8;
 /// Groups that are remembered: frames are asked for in order, by a few threads.
 const REMEMBERED: usize = 4;
 
@@ -133,11 +135,10 @@ impl Planner {
         }
         let middle = frames.start + half as u64;
         let (before, after) = plans.split_at_mut(half);
-        // What the first half cannot do the second hardly can.
-        self.share(frames.start..middle, own, before) && {
-            self.share(middle..frames.end, own, after);
-            true
-        }
+        let is_first_shared = self.share(frames.start..middle, own, before);
+        // What the first half cannot do the second hardly can, unless it is far away.
+        let is_second_shared = (is_first_shared || half >= FAR) && self.share(middle..frames.end, own, after);
+        is_first_shared || is_second_shared
     }
 
     /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
@@ -192,12 +193,8 @@ fn keeps_px(plan: &FramePlan, own: &FramePlan) -> bool {
 
 /// The same of `quality.max_error_dn`.
 fn keeps_dn(plan: &FramePlan, own: &FramePlan) -> bool {
-    let square_dn = |plan: &FramePlan| {
-        let predicted = &plan.predicted;
-        let plain_dn = predicted.plain_silhouettes.map_or(0.0, |plain| plain.error_dn);
-        [predicted.resampling_dn, predicted.blur_dn, plain_dn].iter().map(|dn| dn * dn).sum::<f64>()
-    };
-    plan.predicted.levels_kept || !own.predicted.levels_kept && square_dn(plan) <= square_dn(own)
+    let (here, there) = (&plan.predicted, &own.predicted);
+    here.levels_kept || !there.levels_kept && here.picture_dn() <= there.picture_dn()
 }
 
 /// Plans from one ideal frame: what that is made by is the strictest of all.
