@@ -186,7 +186,13 @@ impl FramePlan {
     /// Whether the one ideal frame was taken at another instant than the middle of the window.
     #[must_use]
     pub fn looks_from_elsewhere(&self) -> bool {
-        self.keys.len() == 1 && self.keys[0].t_s != self.key_s
+        matches!(self.keys.as_slice(), [key] if key.t_s != self.key_s)
+    }
+
+    /// Pose of the ideal frame's camera; of several the middle one's.
+    #[must_use]
+    pub fn ideal_pose(&self) -> CameraPose {
+        self.keys.get(self.keys.len() / 2).map_or(self.key_pose, |key| key.pose)
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.
@@ -269,10 +275,7 @@ impl Planner {
     /// # Errors
     /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
     pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
-        match self.shared_plan(frame)? {
-            Some(plan) => Ok(plan),
-            None => self.plan_from(frame, None),
-        }
+        self.shared_plan(frame).map_or_else(|| self.plan_from(frame, None), Ok)
     }
 
     /// The plan of a frame by itself, or from an ideal frame that others are made from too.

@@ -152,13 +152,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
     let tolerance_px = plan.terrain_error_px;
-    let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.keys[0].pose.position_ned_m.round());
+    let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
     let (lod, triangle_bytes) = (placed.lod, placed.bytes());
     Some(LevelOfDetail { triangles: lod.triangles, away: lod.away, max_error_px: lod.max_error_px, tolerance_px, triangle_bytes })
 }
 
 fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a> {
-    TerrainDetail::new(terrain, &plan.keys[0].pose, plan.tangents(), plan.ideal.focal_px.max_element(), plan.terrain_error_px)
+    TerrainDetail::new(terrain, &plan.ideal_pose(), plan.tangents(), plan.ideal.focal_px.max_element(), plan.terrain_error_px)
 }
 
 fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {

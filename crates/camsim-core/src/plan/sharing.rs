@@ -14,7 +14,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use super::{FramePlan, KeyFrame, LensReach, Motion, PlanError, Planner, Skip, bounds, bounds::View, levels::Sampling};
+use super::{FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds, bounds::View, levels::Sampling};
 use crate::scenario::{Auto, Preset, Silhouettes};
 
 /// Sharing must spare this part of the time.
@@ -73,9 +73,9 @@ impl Planner {
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
-    pub(super) fn shared_plan(&self, frame: u64) -> Result<Option<FramePlan>, PlanError> {
+    pub(super) fn shared_plan(&self, frame: u64) -> Option<FramePlan> {
         if !self.may_share() || frame >= self.sequence.frames {
-            return Ok(None);
+            return None;
         }
         let number = self.group_of(frame);
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done. Nobody waits for a group while holding it.
@@ -84,7 +84,7 @@ impl Planner {
         let group = match known {
             Some(group) => group,
             None => {
-                let group = Arc::new(self.group(number)?);
+                let group = Arc::new(self.group(number));
                 let mut recent = recent();
                 recent.0.push_back(group.clone());
                 if recent.0.len() > REMEMBERED {
@@ -93,7 +93,7 @@ impl Planner {
                 group
             }
         };
-        Ok(group.plans[(frame - group.first) as usize].clone())
+        group.plans.get((frame - group.first) as usize).cloned().flatten()
     }
 
     /// Whether the scenario leaves it to the plan how frames are made.
@@ -107,20 +107,24 @@ impl Planner {
             && self.zoom.is_none()
     }
 
-    fn group(&self, number: u64) -> Result<Group, PlanError> {
+    /// A fault of its middle frame is that frame's own: the others are then planned by themselves, and so is it, when it is asked for.
+    fn group(&self, number: u64) -> Group {
         let size = u64::from(self.sequence.scenario.quality.frames_per_ideal);
         let first = number * size;
         let frames = first..(first + size).min(self.sequence.frames);
         let mut plans = vec![None; (frames.end - first) as usize];
         if frames.end - first > 1 {
             let middle = (first + frames.end) / 2;
-            let own = self.plan_from(middle, None)?;
-            if !own.edges.has_rays() {
-                self.share(frames, &own, &mut plans);
+            if let Ok(own) = self.plan_from(middle, None) {
+                if !own.edges.has_rays() {
+                    self.share(frames, &own, &mut plans);
+                }
+                if let Some(place) = plans.get_mut((middle - first) as usize) {
+                    place.get_or_insert(own);
+                }
             }
-            plans[(middle - first) as usize].get_or_insert(own);
         }
-        Ok(Group { number, first, plans })
+        Group { number, first, plans }
     }
 
     /// Plans `frames` from one ideal frame, or from as few as will do; `false` if none of them shares.
