@@ -5,17 +5,20 @@ mod common;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, Planner, TemporalStage},
+    mount::CameraPath,
+    plan::{FramePlan, PlanError, Planner, TemporalStage},
+    pose::BodyState,
     reference::{Oracle, coord_errors},
     scenario::{Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
     sequence::Sequence,
+    trajectory::Trajectory,
 };
 use camsim_gpu::{Engine, engine::Finished};
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 const ALL: [Channel; 3] = [Channel::Color, Channel::Coords, Channel::Depth];
-/// Two groups.
+/// Two groups of eight.
 const FRAMES: u64 = 16;
 
 /// Over a pattern, with every effect that moves a pixel's source.
@@ -140,4 +143,32 @@ fn what_moves_too_far_is_not_shared() {
     single.frames = 6;
     single.scenario.quality.frames_per_ideal = 5;
     assert_eq!(group(&Arc::new(single)), None);
+}
+
+/// The frame that a group is planned from by itself cannot be made; the others can.
+#[test]
+fn a_fault_of_one_frame_is_its_own() {
+    let mut spun = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 8));
+    let knot = |k: i32| BodyState {
+        position_ned_m: DVec3::new(0.0, 0.0, -80.0),
+        velocity_ned_m_s: DVec3::ZERO,
+        acceleration_ned_m_s2: DVec3::ZERO,
+        ned_from_body: DQuat::IDENTITY,
+        // About frame 4, from half a period before its stamp on.
+        rate_body_rad_s: DVec3::Z * if k == 8 { 20.0 } else { 0.0 },
+        angular_acceleration_body_rad_s2: DVec3::ZERO,
+    };
+    let trajectory = Trajectory::uniform(-0.5 / 30.0, 1.0 / 30.0, 1.0, (4..36).map(knot).collect()).expect("knots");
+    spun.path = Arc::new(CameraPath::new(trajectory, &spun.scenario.camera.mount).expect("a legal mount"));
+    let spun = Arc::new(spun);
+    let side = |frame| *planned(&spun, 16_384, frame).expect("a plan").ideal.size_px.iter().max().expect("two sides");
+    let [still, turned] = [0, 4].map(side);
+    assert!(turned > still + 20, "{still} {turned}");
+    let limit_px = (still + turned) / 2;
+    assert!(matches!(planned(&spun, limit_px, 4), Err(PlanError::IdealTooLarge { frame: 4, .. })));
+    assert!(planned(&spun, limit_px, 0).is_ok());
+}
+
+fn planned(sequence: &Arc<Sequence>, max_side_px: u32, frame: u64) -> Result<FramePlan, PlanError> {
+    Planner::new(sequence.clone(), &[Channel::Color], max_side_px).expect("a planner").plan(frame)
 }
