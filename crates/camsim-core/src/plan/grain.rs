@@ -2,16 +2,17 @@
 //!
 //! A texture's grain is its power spectrum, mean over directions and channels: variance for each square cycle a texel, in linear light. It
 //! is found from the variances that go when 2x2, 4x4, ... texels become one, which needs no transform: a spectrum is fitted to them.
+//! Pictures of real ground are not equally grainy everywhere, a lawn beside parked cars, and often empty in their corners, so that each piece
+//! of a texture has a spectrum of its own, found when first looked at.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
 
 use crate::scene::{Scene, Texture};
 
-/// Side of the pieces of a texture that are looked at, and how many of them along each side.
-const PIECE_PX: u32 = 256;
-const PIECES: u32 = 2;
+/// Side of the pieces of a texture.
+const PIECE_PX: u32 = 128;
 /// Texels along each side of a block that stand for it, where the whole of a large texture is looked at.
 const OF_BLOCK: u32 = 4;
 /// Frequency that the loss of the finest detail tells most about, cycles a texel; each further level is an octave lower.
@@ -22,14 +23,24 @@ const ROUNDS: u32 = 24;
 const AN_OCTAVE: u32 = 4;
 const DIRECTIONS: u32 = 4;
 
-/// Grain of every surface of a scene, found once.
+/// Grain of every surface of a scene.
 #[derive(Debug, Default)]
 pub(super) struct SceneGrain {
-    terrain: Option<Arc<Spectrum>>,
-    meshes: Vec<Arc<Spectrum>>,
+    terrain: Option<Arc<Grain>>,
+    meshes: Vec<Arc<Grain>>,
 }
 
-/// Power spectrum of a texture.
+/// Grain of a texture.
+#[derive(Debug)]
+pub(super) struct Grain {
+    texture: Arc<Texture>,
+    /// Of pieces row by row, the last ones of a row and a column moved inwards to be whole.
+    pieces: Vec<OnceLock<Spectrum>>,
+    /// What goes with each level of detail of the whole, for details wider than a piece.
+    whole: OnceLock<Vec<f64>>,
+}
+
+/// Power spectrum of a piece of a texture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Spectrum {
     /// Natural logarithms at [`FINEST`] and the octaves below it; straight lines between them. Empty for a texture of one colour.
@@ -38,25 +49,56 @@ pub(super) struct Spectrum {
 
 impl SceneGrain {
     pub fn new(scene: &Scene) -> Self {
-        let mut known: Vec<(Arc<Texture>, Arc<Spectrum>)> = Vec::new();
+        let mut known: Vec<Arc<Grain>> = Vec::new();
         let mut of = |texture: &Arc<Texture>| {
-            if let Some((_, spectrum)) = known.iter().find(|(seen, _)| Arc::ptr_eq(seen, texture)) {
-                return spectrum.clone();
+            if let Some(grain) = known.iter().find(|grain| Arc::ptr_eq(&grain.texture, texture)) {
+                return grain.clone();
             }
-            let spectrum = Arc::new(Spectrum::of(texture));
-            known.push((texture.clone(), spectrum.clone()));
-            spectrum
+            known.push(Arc::new(Grain::new(texture.clone())));
+            known[known.len() - 1].clone()
         };
         let terrain = scene.terrain.as_ref().map(|terrain| of(&terrain.texture));
         Self { terrain, meshes: scene.meshes.iter().map(|mesh| of(&mesh.texture)).collect() }
     }
 
     /// Of surface 0 (terrain) or 1 + i (mesh i).
-    pub fn of(&self, surface: usize) -> Option<&Spectrum> {
+    pub fn of(&self, surface: usize) -> Option<&Grain> {
         match surface.checked_sub(1) {
             None => self.terrain.as_deref(),
             Some(i) => self.meshes.get(i).map(AsRef::as_ref),
         }
+    }
+}
+
+impl Grain {
+    fn new(texture: Arc<Texture>) -> Self {
+        let [columns, rows] = texture.size_px.map(|side| side.div_ceil(PIECE_PX).max(1) as usize);
+        Self { texture, pieces: (0..columns * rows).map(|_| OnceLock::new()).collect(), whole: OnceLock::new() }
+    }
+
+    /// About a place of the texture, texels; textures repeat.
+    pub fn at(&self, texel: DVec2) -> &Spectrum {
+        let size_px = self.texture.size_px;
+        let piece = [0, 1].map(|k| (texel[k].rem_euclid(f64::from(size_px[k].max(1))) as u32).min(size_px[k].saturating_sub(1)) / PIECE_PX);
+        let columns = size_px[0].div_ceil(PIECE_PX).max(1);
+        self.pieces[(piece[1] * columns + piece[0]) as usize].get_or_init(|| self.spectrum(piece))
+    }
+
+    fn spectrum(&self, piece: [u32; 2]) -> Spectrum {
+        let texture = &*self.texture;
+        let decode = texture.encoding.decode_table();
+        let side = texture.size_px.map(|side| side.min(PIECE_PX));
+        let [x0, y0] = [0, 1].map(|k: usize| (piece[k] * PIECE_PX).min(texture.size_px[k] - side[k]));
+        let values = (0..side[0] * side[1]).map(|i| color(texture, &decode, x0 + i % side[0], y0 + i / side[0])).collect();
+        let mut lost = losses(Piece { size_px: side.map(|n| n as usize), values });
+        // Of a large texture the blocks are seen through a few of their texels.
+        let halvings = (texture.size_px[0].min(texture.size_px[1]) / PIECE_PX).max(1).ilog2();
+        if halvings > 0 {
+            let whole = self.whole.get_or_init(|| losses(thinned(texture, 1 << halvings)));
+            let beyond = lost.len().saturating_sub(halvings as usize);
+            lost.extend(whole.iter().skip(beyond));
+        }
+        Spectrum::fitted(&lost)
     }
 }
 
@@ -65,18 +107,6 @@ impl Spectrum {
     #[cfg(test)]
     pub fn flat(log_density: f64) -> Self {
         Self { log_density: vec![log_density; 2] }
-    }
-
-    fn of(texture: &Texture) -> Self {
-        let mut lost = losses_of_pieces(texture);
-        // Details wider than a piece, from the whole: of a large texture its blocks are seen through a few of their texels.
-        let halvings = (texture.size_px[0].min(texture.size_px[1]) / PIECE_PX).max(1).ilog2();
-        if halvings > 0 {
-            let whole = losses(thinned(texture, 1 << halvings));
-            let beyond = lost.len().saturating_sub(halvings as usize);
-            lost.extend(whole.into_iter().skip(beyond));
-        }
-        Self::fitted(&lost)
     }
 
     /// The spectrum whose detail of 2^level texels has the variances `lost`.
@@ -147,22 +177,6 @@ struct Piece {
     values: Vec<[f32; 3]>,
 }
 
-/// Variance that goes with each level of detail, the mean over a few pieces of the texture.
-fn losses_of_pieces(texture: &Texture) -> Vec<f64> {
-    let decode = texture.encoding.decode_table();
-    let side = texture.size_px.map(|side| side.min(PIECE_PX));
-    let mut sums: Vec<f64> = Vec::new();
-    for piece in 0..PIECES * PIECES {
-        let first = |k: usize, of: u32| (texture.size_px[k] - side[k]) * of / (PIECES - 1).max(1);
-        let [x0, y0] = [first(0, piece % PIECES), first(1, piece / PIECES)];
-        let values = (0..side[0] * side[1]).map(|i| color(texture, &decode, x0 + i % side[0], y0 + i / side[0])).collect();
-        let found = losses(Piece { size_px: side.map(|n| n as usize), values });
-        sums.resize(found.len(), 0.0);
-        sums.iter_mut().zip(found).for_each(|(sum, lost)| *sum += lost / f64::from(PIECES * PIECES));
-    }
-    sums
-}
-
 fn color(texture: &Texture, decode: &[f32; 256], x: u32, y: u32) -> [f32; 3] {
     let at = 4 * (y as usize * texture.size_px[0] as usize + x as usize);
     [0, 1, 2].map(|c| decode[texture.rgba8[at + c] as usize])
@@ -219,13 +233,23 @@ mod tests {
         Texture { size_px: [side, side], rgba8, encoding: Encoding::Linear }
     }
 
+    fn noise(x: u32, y: u32) -> f64 {
+        f64::from(pcg4d([x, y, 1, 1])[0] >> 8) / f64::from(1 << 24)
+    }
+
+    /// About the middle of a picture.
+    fn spectrum(texture: Texture) -> Spectrum {
+        let middle = 0.5 * DVec2::from_array(texture.size_px.map(f64::from));
+        Grain::new(Arc::new(texture)).at(middle).clone()
+    }
+
     #[test]
     fn white_noise_is_flat() {
-        let noise = |x: u32, y: u32| f64::from(pcg4d([x, y, 1, 1])[0] >> 8) / f64::from(1 << 24);
-        let spectrum = Spectrum::of(&picture(512, &noise));
-        // A uniform value has a variance of 1/12, over one square cycle.
+        let grain = Grain::new(Arc::new(picture(512, &noise)));
+        // A uniform value has a variance of 1/12, over one square cycle. Of the slow waves a piece has few.
         for frequency in [0.03, 0.1, 0.2, 0.4] {
-            let found = 12.0 * spectrum.density(frequency);
+            let of_piece = |i: u32| grain.at(DVec2::new(f64::from(i % 4), f64::from(i / 4)) * 128.0).density(frequency);
+            let found = 12.0 * (0..16).map(of_piece).sum::<f64>() / 16.0;
             assert!((0.8..1.25).contains(&found), "{frequency}: {found}");
         }
     }
@@ -233,7 +257,7 @@ mod tests {
     #[test]
     fn waves_are_found_at_their_frequency() {
         for cycles in [1.0 / 4.0, 1.0 / 16.0, 1.0 / 64.0] {
-            let spectrum = Spectrum::of(&picture(512, &|x, y| {
+            let spectrum = spectrum(picture(512, &|x, y| {
                 0.5 + 0.4 * (std::f64::consts::TAU * cycles * (0.8 * f64::from(x) + 0.6 * f64::from(y))).sin()
             }));
             let ratio = |away: f64| spectrum.density(cycles * away) / spectrum.density(cycles);
@@ -246,8 +270,19 @@ mod tests {
     }
 
     #[test]
+    fn each_piece_has_its_own() {
+        // 300 texels: the last piece of a row is moved inwards, over a third of the noise.
+        let grain = Grain::new(Arc::new(picture(300, &|x, y| if x < 192 { noise(x, y) } else { 0.5 })));
+        let density = |x: f64| 12.0 * grain.at(DVec2::new(x, 70.0)).density(0.4);
+        assert!((0.8..1.25).contains(&density(5.0)), "{}", density(5.0));
+        assert!((0.4..0.6).contains(&density(200.0)), "{}", density(200.0));
+        assert!((0.1..0.2).contains(&density(299.9)), "{}", density(299.9));
+        assert_eq!([density(-295.0), density(600.5), density(-0.1)], [density(5.0), density(0.5), density(299.9)]);
+    }
+
+    #[test]
     fn one_colour_has_no_grain() {
-        assert_eq!(Spectrum::of(&Texture::uniform([9; 4], Encoding::Srgb)).density(0.1), 0.0);
-        assert_eq!(Spectrum::of(&picture(64, &|_, _| 0.5)).density(0.1), 0.0);
+        assert_eq!(spectrum(Texture::uniform([9; 4], Encoding::Srgb)).density(0.1), 0.0);
+        assert_eq!(spectrum(picture(64, &|_, _| 0.5)).density(0.1), 0.0);
     }
 }

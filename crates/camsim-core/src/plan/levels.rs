@@ -152,7 +152,7 @@ impl<'a> Prospect<'a> {
             let clear =
                 sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
             Some(Sight {
-                spectrum: grain.of(shown.surface)?,
+                spectrum: grain.of(shown.surface)?.at(shown.texel),
                 gain: gain(probe.pixel) * clear,
                 key_px: shown.key_px,
                 key_from_camera: shown.key_from_camera,
@@ -343,6 +343,7 @@ struct Shown {
     surface: usize,
     inverse_depth: f64,
     range_m: f64,
+    texel: DVec2,
     texel_from_camera: DMat2,
     /// In the key frame, from its principal point, camera px.
     key_px: DVec2,
@@ -369,6 +370,7 @@ impl Shown {
             surface: here.surface,
             inverse_depth: here.depth_m.recip(),
             range_m: here.depth_m * uv.extend(1.0).length(),
+            texel: surfaces.texel(&here),
             texel_from_camera,
         })
     }
