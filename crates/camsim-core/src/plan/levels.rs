@@ -16,7 +16,7 @@ use super::{
     grain::{SceneGrain, Spectrum},
     probes::Probe,
     surfaces::{FOG_AT_VISIBILITY, Met, Surfaces},
-    transfer::{Path, SurfaceFilter, error2},
+    transfer::{Path, SurfaceFilter, error2, sinc},
 };
 use crate::{
     camera::CameraModel,
@@ -92,6 +92,8 @@ pub(super) struct Choice {
 
 /// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
 struct Sight<'a> {
+    /// Probes that it stands for.
+    weight: f64,
     spectrum: &'a Spectrum,
     /// Of the linear range, for each unit of texture.
     gain: f64,
@@ -109,7 +111,7 @@ struct Sight<'a> {
 /// The places of a frame.
 pub(super) struct Prospect<'a> {
     sights: Vec<Sight<'a>>,
-    /// Places that count: those, and the sky.
+    /// Probes that count: those that the places stand for, and the sky.
     counted: usize,
     /// Of the camera, and but for whole pixels of every ideal frame.
     principal_px: DVec2,
@@ -129,16 +131,7 @@ impl<'a> Prospect<'a> {
     ) -> Self {
         let (probes, focal_px) = (&reach.probes, reach.camera.focal_px);
         let gain = gain(sequence, &reach.camera);
-        // Evenly over how wide pixels are: the few that are much wider than the rest may be most of the error.
-        let width = |probe: &Probe| {
-            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
-            sides.x_axis.length().max(sides.y_axis.length())
-        };
-        let mut by_width: Vec<&Probe> = probes.iter().collect();
-        by_width.sort_by_key(|probe| (1e4 * width(probe)) as i64);
-        let count = SIGHTS.min(by_width.len());
-        let looked_at: Vec<&Probe> = (0..count).map(|k| by_width[(2 * k + 1) * by_width.len() / (2 * count)]).collect();
-        let sight = |probe: &&Probe| {
+        let sight = |probe: &Probe| {
             let [x, y] = probe.pixel;
             let mid_s = stamp_s + shutter.dt_pixel_s(x, y);
             let pose = sequence.path.pose(mid_s);
@@ -147,12 +140,15 @@ impl<'a> Prospect<'a> {
                 let in_key = rotation * uv.extend(1.0) + inverse_depth * shift;
                 focal_px * in_key.truncate() / in_key.z
             };
-            let shown = Shown::new(surfaces, &pose, probe.uv, focal_px, key_px)?;
+            let Some(here) = surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0)) else { return Seen::Sky };
+            let Some(shown) = Shown::new(surfaces, &pose, &here, probe.uv, focal_px, key_px) else { return Seen::Several };
+            let Some(grain) = grain.of(shown.surface) else { return Seen::Several };
             let path = path_px(&sequence.path, mid_s, shutter.exposure_s(), probe.uv, shown.inverse_depth, focal_px);
             let clear =
                 sequence.scene.fog_visibility_m.map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * shown.range_m / visibility_m).exp());
-            Some(Sight {
-                spectrum: grain.of(shown.surface)?.at(shown.texel),
+            Seen::Surface(Sight {
+                weight: 1.0,
+                spectrum: grain.at(shown.texel),
                 gain: gain(probe.pixel) * clear,
                 key_px: shown.key_px,
                 key_from_camera: shown.key_from_camera,
@@ -162,15 +158,15 @@ impl<'a> Prospect<'a> {
                 path_px: path.1,
             })
         };
-        let sights: Vec<Sight<'_>> = looked_at.par_iter().filter_map(sight).collect();
-        let is_sky = |probe: &&&Probe| {
-            let [x, y] = probe.pixel;
-            let pose = sequence.path.pose(stamp_s + shutter.dt_pixel_s(x, y));
-            surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0)).is_none()
+        let seen: Vec<Seen<'_>> = probes.par_iter().map(sight).collect();
+        let counted = seen.iter().filter(|seen| !matches!(seen, Seen::Several)).count();
+        let sights = seen.into_iter().filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None }).collect();
+        let width = |probe: &Probe| {
+            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
+            sides.x_axis.length().max(sides.y_axis.length())
         };
-        let counted = sights.len() + looked_at.iter().filter(is_sky).count();
-        let widest = by_width.last().map_or(0.0, |probe| width(probe));
-        Self { sights, counted, principal_px: reach.camera.principal_point_px, widest }
+        let widest = probes.iter().map(width).fold(0.0, f64::max);
+        Self { sights: few_of(sights), counted, principal_px: reach.camera.principal_point_px, widest }
     }
 
     /// What is to be expected of a way of sampling.
@@ -195,13 +191,19 @@ impl<'a> Prospect<'a> {
             let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
             let path = samples.map(|samples| Path { along: scale * sight.path, samples });
             let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
-            error.map(|square| sight.gain * sight.gain * square)
+            let weight = sight.weight * sight.gain * sight.gain;
+            [sight.weight, weight * error[0], weight * error[1]]
         };
         // Summed in their order: a plan does not depend on how threads share work.
-        let squares: Vec<[f64; 2]> = self.sights.par_iter().step_by(every).map(of).collect();
-        let sums = squares.iter().fold([0.0; 2], |sum, square| [sum[0] + square[0], sum[1] + square[1]]);
-        let part = squares.len() as f64 / self.sights.len().max(1) as f64;
-        sums.map(|sum| sum / (part * self.counted as f64).max(1.0))
+        let squares: Vec<[f64; 3]> = self.sights.par_iter().step_by(every).map(of).collect();
+        let [weight, exact, sampled] = squares.iter().fold([0.0; 3], |sum, square| [0, 1, 2].map(|k: usize| sum[k] + square[k]));
+        let part = weight / self.weight();
+        [exact, sampled].map(|sum| sum / (part * self.counted as f64).max(1.0))
+    }
+
+    /// Of all places.
+    fn weight(&self) -> f64 {
+        self.sights.iter().map(|sight| sight.weight).sum::<f64>().max(1e-9)
     }
 
     /// The cheapest sampling within the tolerance (1/255, of an ideal frame of a scale; `None` is none), or the best there is. The scale is
@@ -307,11 +309,40 @@ impl<'a> Prospect<'a> {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
             let reads = blur.map_or(area.taps[0] * area.taps[1], |blur| sample_count(&blur, scale * sight.path_px, &area));
-            f64::from(reads) * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
+            sight.weight * f64::from(reads) * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
         };
-        let reads = self.sights.iter().map(of).sum::<f64>() / self.sights.len().max(1) as f64;
+        let reads = self.sights.iter().map(of).sum::<f64>() / self.weight();
         ideal_share * scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
     }
+}
+
+/// What a probe sees.
+enum Seen<'a> {
+    Sky,
+    /// More than one surface, or one of which nothing is known.
+    Several,
+    Surface(Sight<'a>),
+}
+
+/// Some of the places, each standing for as many as it is taken for. Half of them are taken evenly, and half by how much of what is hard to
+/// resample they show: the few houses on a lawn, or the few pixels that are much wider than the rest, may be most of the error.
+fn few_of(sights: Vec<Sight<'_>>) -> Vec<Sight<'_>> {
+    let hard: Vec<f64> = sights.iter().map(Sight::hard_to_resample).collect();
+    let mean = hard.iter().sum::<f64>() / hard.len().max(1) as f64;
+    let part = |hard: f64| if mean > 0.0 { 0.5 + 0.5 * hard / mean } else { 1.0 };
+    let mut by_part: Vec<(f64, Sight<'_>)> = hard.iter().map(|&hard| part(hard)).zip(sights).collect();
+    by_part.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let step = by_part.iter().map(|(part, _)| part).sum::<f64>() / SIGHTS.min(by_part.len()).max(1) as f64;
+    let mut passed = 0.5 * step;
+    by_part
+        .into_iter()
+        .filter_map(|(part, sight)| {
+            let before = (passed / step).floor();
+            passed += part;
+            let times = (passed / step).floor() - before;
+            (times > 0.0).then_some(Sight { weight: times * step / part, ..sight })
+        })
+        .collect()
 }
 
 /// Of the linear range, for each unit of light that arrives at a pixel.
@@ -338,6 +369,21 @@ fn dn(square: f64) -> f64 {
     (SAFETY * 255.0 * square.sqrt()).hypot(FORMAT_DN)
 }
 
+impl Sight<'_> {
+    /// Power of the waves of two and four pixels: a measure to compare places by.
+    fn hard_to_resample(&self) -> f64 {
+        const DIRECTIONS: u32 = 3;
+        let cycles_from_key = self.texel_from_key.inverse().transpose();
+        let power = |length: f64, direction: u32| {
+            let f = length * DVec2::from_angle(std::f64::consts::PI * (f64::from(direction) + 0.5) / f64::from(DIRECTIONS));
+            let cycles = cycles_from_key * f;
+            length * length * self.spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4)
+        };
+        let powers = [0.25, 0.5].into_iter().flat_map(|length| (0..DIRECTIONS).map(move |direction| power(length, direction)));
+        self.gain * self.gain / self.texel_from_key.determinant().abs() * powers.sum::<f64>()
+    }
+}
+
 /// What a ray shows of a texture.
 struct Shown {
     surface: usize,
@@ -351,15 +397,21 @@ struct Shown {
 }
 
 impl Shown {
-    /// By the ray itself and two beside it; `None` for the sky, a texture of one colour, and where the three meet different surfaces.
-    fn new(surfaces: &Surfaces, pose: &CameraPose, uv: DVec2, focal_px: DVec2, key_px: impl Fn(DVec2, f64) -> DVec2) -> Option<Self> {
+    /// By what the ray itself meets and two beside it; `None` for a texture of one colour, and where the three meet different surfaces.
+    fn new(
+        surfaces: &Surfaces,
+        pose: &CameraPose,
+        here: &Met,
+        uv: DVec2,
+        focal_px: DVec2,
+        key_px: impl Fn(DVec2, f64) -> DVec2,
+    ) -> Option<Self> {
         const BESIDE_PX: f64 = 0.5;
         let look = |offset_px: DVec2| surfaces.meet(pose.position_ned_m, pose.ned_from_camera * (uv + offset_px / focal_px).extend(1.0));
-        let here = look(DVec2::ZERO)?;
         let beside = [DVec2::X, DVec2::Y].map(|axis| look(BESIDE_PX * axis).filter(|beside| beside.surface == here.surface));
         let [x, y] = [beside[0].as_ref()?, beside[1].as_ref()?];
         let texel_from_camera =
-            DMat2::from_cols(surfaces.texel(x) - surfaces.texel(&here), surfaces.texel(y) - surfaces.texel(&here)) * BESIDE_PX.recip();
+            DMat2::from_cols(surfaces.texel(x) - surfaces.texel(here), surfaces.texel(y) - surfaces.texel(here)) * BESIDE_PX.recip();
         let own_key_px = key_px(uv, here.depth_m.recip());
         let moved = |axis: DVec2, beside: &Met| key_px(uv + BESIDE_PX * axis / focal_px, beside.depth_m.recip()) - own_key_px;
         let key_from_camera = DMat2::from_cols(moved(DVec2::X, x), moved(DVec2::Y, y)) * BESIDE_PX.recip();
@@ -370,7 +422,7 @@ impl Shown {
             surface: here.surface,
             inverse_depth: here.depth_m.recip(),
             range_m: here.depth_m * uv.extend(1.0).length(),
-            texel: surfaces.texel(&here),
+            texel: surfaces.texel(here),
             texel_from_camera,
         })
     }
