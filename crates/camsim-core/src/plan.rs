@@ -13,7 +13,7 @@ use crate::{
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
-    scenario::{Auto, Channel, Preset, Silhouettes},
+    scenario::{Channel, Preset},
     sequence::Sequence,
     shutter::{LinesAxis, Shutter, ShutterError},
     temporal::{IdealGeometry, TapStage, displacement::Twist},
@@ -32,8 +32,10 @@ mod holes;
 mod keys;
 mod levels;
 mod lines;
+mod look;
 mod motion;
 pub mod paper;
+mod picture;
 mod probes;
 mod rounding;
 mod sharing;
@@ -41,6 +43,8 @@ mod sight;
 mod stages;
 mod surfaces;
 pub(crate) mod transfer;
+
+use look::{Look, Scenery};
 
 pub use bounds::LensReach;
 pub use contours::Contours;
@@ -72,12 +76,6 @@ pub enum PlanError {
         "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
     )]
     NoRay,
-    /// A frame cannot be made from the same ideal frame as others. [`Planner::plan`] then makes it from its own.
-    #[error("frame {frame} cannot be made from the same ideal frame as others: silhouettes would cost too much")]
-    NotShared {
-        /// Frame number.
-        frame: u64,
-    },
     /// The ideal frame would be too large.
     #[error(
         "frame {frame} needs an ideal frame of {width}x{height} px, more than {limit} px a side: the field of view is too wide for a flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view"
@@ -275,135 +273,37 @@ impl Planner {
     /// # Errors
     /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
     pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
-        self.shared_plan(frame).map_or_else(|| self.plan_from(frame, None), Ok)
+        self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)
     }
 
-    /// The plan of a frame by itself, or from an ideal frame that others are made from too.
-    fn plan_from(&self, frame: u64, common: Option<&sharing::Common>) -> Result<FramePlan, PlanError> {
-        let stamp_s = self.stamp_s(frame);
-        let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
-        let reach = match (&self.fixed, &self.zoom, zoom) {
-            (Some(reach), ..) => reach.clone(),
-            (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
-            _ => return Err(PlanError::NoRay),
-        };
-        let (first, last) = self.shutter.window_s();
-        let window_s = [stamp_s + first, stamp_s + last];
-        let span_s = self.sequence.path.span_s();
-        let middle_s = 0.5 * (window_s[0] + window_s[1]);
-        let key_s = common.map_or(middle_s, |common| common.key_s);
+    /// The plan of a frame by itself.
+    fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        let look = self.look(frame, None)?;
+        self.plan_of(&look, &look.scenery())
+    }
+
+    fn plan_of(&self, look: &Look<'_>, scenery: &Scenery<'_>) -> Result<FramePlan, PlanError> {
+        let &Look { frame, stamp_s, window_s, key_s, key_pose, key_twist, demanded, .. } = look;
         let quality = &self.sequence.scenario.quality;
-        let scene = &self.sequence.scene;
-        let path = &*self.sequence.path;
-        let key_pose = path.pose(key_s);
-        let key_twist =
-            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
-        let demanded = forced::temporal_stage(quality);
-        let is_paper = quality.preset == Preset::Paper;
-        let geometry = |keys: &[KeyFrame], scale: f64, displaced: Option<(TemporalStage, Twist)>| {
-            let own = || bounds::view(&reach, path, &self.shutter, stamp_s, key_s, keys, &self.surfaces, displaced);
-            common.map_or_else(own, |common| common.view).pixels(&reach.camera, scale)
-        };
-        let frames_per_ideal = common.map_or(1.0, |common| common.count() as f64);
-        let displaced = demanded.map(|stage| (stage, key_twist));
-        let one_key = vec![KeyFrame { t_s: key_s, pose: key_pose }];
-        let least_scale = reach.least_scale();
-        let mut ideal = if is_paper { paper::ideal_geometry(&reach.camera) } else { geometry(&one_key, least_scale, displaced) };
-        let prospect = levels::Prospect::new(&reach, &self.sequence, &self.surfaces, &self.grain, &self.shutter, stamp_s, &key_pose);
-        let measure = |ideal: &IdealGeometry| motion::measure(&reach, path, &self.shutter, stamp_s, key_s, ideal, &self.surfaces);
-        let exposed = |motion: &Motion, ideal: &IdealGeometry| exposure::Exposed {
-            reach: &reach,
-            path,
-            shutter: &self.shutter,
-            stamp_s,
-            focal_px: ideal.focal_px,
-            motion: *motion,
-        };
-        let mut motion = measure(&ideal);
-        let reason_for_none = self.outline.reason_for_none(scene, &key_pose, ideal.tangents(), motion.travel_m);
-        let silhouettes_in_view = reason_for_none.is_none();
-        let may_leave_plain = match quality.silhouettes {
-            Silhouettes::Auto => quality.key_frames == Auto::Auto && quality.max_error_dn < edges::IGNORED_DN,
-            Silhouettes::Plain => true,
-            Silhouettes::Rays => false,
-        };
-        let outlook = (silhouettes_in_view && may_leave_plain && !is_paper).then(|| {
-            let gain = &levels::gain(&self.sequence, &reach.camera);
-            let (surfaces, shutter) = (&self.surfaces, &self.shutter);
-            let trial = dry_run::Trial {
-                surfaces,
-                path,
-                shutter,
-                stamp_s,
-                key_s,
-                key_pose: &key_pose,
-                ideal: &ideal,
-                twist: key_twist,
-                nearest_depth: false,
-            };
-            let truths = error::Truths::of_silhouettes(&reach, trial);
-            let (holes, least_share) = (truths.holes(&one_key, quality.max_error_px), truths.silhouette_share());
-            contours::Search { reach: &reach, surfaces, path, shutter, stamp_s, key_pose: &key_pose, gain, holes, least_share }.outlook()
-        });
-        if let (Some(common), Some(outlook), Silhouettes::Auto) = (common, outlook, quality.silhouettes) {
-            let scale = common.given.as_ref().map_or(levels::MOST_SCALE, |sampling| sampling.scale);
-            if !outlook.at_scale(scale).are_affordable(quality.max_error_dn) {
-                return Err(PlanError::NotShared { frame });
-            }
-        }
-        let mut plain = None;
-        let mut price = 0.0;
-        let sampling = if is_paper {
-            levels::Sampling::of_paper()
-        } else {
-            let side_px = ideal.size_px[0].max(ideal.size_px[1]);
-            let fits = |scale: f64| f64::from(side_px) * scale / least_scale < f64::from(self.max_side_px);
-            let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
-            let ideal_share = pixels(ideal.size_px) / (pixels(reach.camera.size_px) * least_scale * least_scale * frames_per_ideal);
-            let exposure = exposed(&motion, &ideal).path(quality, &mut Vec::new());
-            let max_error_dn = quality.max_error_dn * common.map_or(1.0, |common| common.share_of_dn);
-            let choose = |tolerance_dn: &dyn Fn(f64) -> Option<f64>| {
-                prospect.choose(quality, tolerance_dn, least_scale, ideal_share, exposure, fits)
-            };
-            let with_plain = |outlook: contours::Outlook| choose(&|scale| outlook.at_scale(scale).leaves_dn(max_error_dn));
-            let choice = match common.map(|common| &common.given) {
-                Some(Some(sampling)) => {
-                    plain = outlook;
-                    prospect.given(sampling, quality, ideal_share, exposure)
-                }
-                Some(None) => {
-                    plain = outlook;
-                    outlook.map_or_else(|| choose(&|_| Some(max_error_dn)), with_plain)
-                }
-                None => {
-                    let mut beside_rays = choose(&|_| Some(max_error_dn));
-                    beside_rays.price += outlook.map_or(0.0, |outlook| outlook.price_of_rays());
-                    let found = outlook.map(with_plain);
-                    let is_cheaper = found.is_some_and(|found| found.within && (!beside_rays.within || found.price < beside_rays.price));
-                    let is_plain = is_cheaper || quality.silhouettes == Silhouettes::Plain;
-                    plain = outlook.filter(|_| is_plain);
-                    found.filter(|found| is_plain && found.within).unwrap_or(beside_rays)
-                }
-            };
-            price = choice.price;
-            choice.sampling
-        };
-        let plain = plain.map(|outlook| outlook.at_scale(sampling.scale));
-        if sampling.scale != least_scale && !is_paper {
-            ideal = geometry(&one_key, sampling.scale, displaced);
-            motion = measure(&ideal);
+        let picture = look.picture(scenery);
+        let sampling = picture.sampling;
+        let (mut ideal, mut motion) = (scenery.ideal, scenery.motion);
+        if sampling.scale != look.reach.least_scale() && !look.is_paper() {
+            ideal = look.geometry(&[look.key()], sampling.scale, demanded);
+            motion = look.motion_in(&ideal);
         }
         if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
             let [width, height] = ideal.size_px.map(u64::from);
             return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
         }
         let mut skipped = Vec::new();
-        let ray = if is_paper { paper::ray_stage(&reach.camera) } else { ray_stage(&reach, &mut skipped) };
-        let (blur, edges) = if is_paper {
+        let camera = &look.reach.camera;
+        let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
+        let (blur, edges) = if look.is_paper() {
             skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
             (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
-            let exposed = exposed(&motion, &ideal);
+            let exposed = look.exposed(motion, &ideal);
             let exposure = exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
             let staged = |exposure| sampling.blur_stage(exposure, quality, motion.blur_px);
             let case = edges::EdgeCase {
@@ -414,8 +314,9 @@ impl Planner {
                 blur: exposure.map(staged),
                 quality,
                 max_side_px: self.max_side_px,
-                reason_for_none: reason_for_none.as_deref(),
-                plain: plain.as_ref(),
+                reason_for_none: scenery.reason_for_none.as_deref(),
+                plain: picture.silhouettes.as_ref().filter(|_| picture.is_plain),
+                fine: picture.fine,
                 truth: self.truth,
             };
             let edges = edges::edge_stage(&case, &mut skipped);
@@ -423,10 +324,10 @@ impl Planner {
             let with_poses = |exposure| if has_rays { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
             (exposure.map(with_poses).map(staged), edges)
         };
-        let expected = prospect.expected(&sampling, blur);
+        let expected = scenery.prospect.expected(&sampling, blur);
         let tried = ideal;
         let case = error::Case {
-            reach: &reach,
+            reach: &look.reach,
             sequence: &self.sequence,
             shutter: &self.shutter,
             stamp_s,
@@ -438,48 +339,51 @@ impl Planner {
             blur,
             straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
-            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, plain.as_ref()),
-            plain,
-            silhouettes_in_view,
-            constant_twist: common.is_none(),
+            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, &picture),
+            silhouettes: picture.silhouettes,
+            silhouettes_in_view: scenery.reason_for_none.is_none(),
+            constant_twist: look.common.is_none(),
             surfaces: &self.surfaces,
         };
         let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion);
         let error::Way { temporal, blur } = way;
-        let displaced = Some((temporal, key_twist));
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
             // These look, and read the depth, where the point is not.
-            ideal = geometry(&one_key, sampling.scale, displaced);
+            ideal = look.geometry(&[look.key()], sampling.scale, Some(temporal));
         }
         motion::note_skips(&motion, temporal, &mut skipped);
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
-        predicted.holes_of_one = looks_behind.then(|| truths.holes(&one_key, quality.max_error_px));
+        predicted.holes_of_one = looks_behind.then(|| truths.holes(&[look.key()], quality.max_error_px));
         let wanted = keys::wanted(predicted.holes_of_one.as_ref(), temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
-            let keys = keys::spread(path, window_s, count);
-            let ideal = geometry(&keys, sampling.scale, displaced);
+            let keys = keys::spread(look.path(), window_s, count);
+            let ideal = look.geometry(&keys, sampling.scale, Some(temporal));
             (keys, ideal)
         });
-        let keys = keys.map_or(one_key, |(keys, of_keys)| {
-            ideal = of_keys;
-            keys
-        });
+        let keys = keys.map_or_else(
+            || vec![look.key()],
+            |(keys, of_keys)| {
+                ideal = of_keys;
+                keys
+            },
+        );
         predicted.holes =
             if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
         self.note_static_skips(&mut skipped, temporal);
-        price += way.price();
-        let key_pose = if common.is_some() { path.pose(middle_s) } else { key_pose };
+        // Coordinates are those of the middle of the frame's own window, wherever the ideal frame is taken.
+        let middle_s = 0.5 * (window_s[0] + window_s[1]);
+        let span_s = self.sequence.path.span_s();
         Ok(FramePlan {
             frame,
             preset: quality.preset,
             stamp_s,
             window_s,
             extrapolated: window_s[0] < span_s.0 || window_s[1] > span_s.1,
-            zoom,
-            camera: reach.camera.clone(),
+            zoom: look.zoom,
+            camera: camera.clone(),
             shutter: self.shutter,
             key_s: middle_s,
-            key_pose,
+            key_pose: look.path().pose(middle_s),
             key_twist,
             keys,
             shared_by: None,
@@ -490,13 +394,13 @@ impl Planner {
             edges,
             surface_reads: sampling.surface_reads,
             taps: sampling.taps,
-            linear_fog: if is_paper { paper::fog(scene) } else { None },
+            linear_fog: if look.is_paper() { paper::fog(&self.sequence.scene) } else { None },
             truth: self.truth,
             motion,
             terrain_error_px,
             predicted,
             skipped,
-            price,
+            price: picture.price + way.price(),
         })
     }
 

@@ -409,7 +409,7 @@ mod tests {
             let plan = planner.plan(1).expect(case.name);
             let megapixels = plan.ideal.size_px.iter().map(|&side| f64::from(side)).product::<f64>() / 1e6;
             assert!(megapixels < 4.0, "{}: an ideal frame of {:?} px", case.name, plan.ideal.size_px);
-            let silhouettes = plan.edges != EdgeStage::None || plan.predicted.plain_silhouettes.is_some();
+            let silhouettes = plan.edges != EdgeStage::None || plan.predicted.silhouettes.is_some();
             let of_houses =
                 case.sequence.scene.meshes.len() > 1 || case.group == Group::AllEffects && case.sequence.scene.terrain.is_some();
             assert!(silhouettes || !of_houses, "{}: {:?}", case.name, plan.edges);

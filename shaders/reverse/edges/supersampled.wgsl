@@ -115,8 +115,10 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
 // Of a pixel whose sources pass no mark: whether nothing moves into it either. Where its parallax passes a silhouette its corners are asked: rays
 // that meet what the plain gather took saw one surface all over the pixel, and that one is better read by the spline.
 fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
-    for (var node = 0u; node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
-        let pose = pose_at_node(pixel, node);
+    // As in candidates.wgsl.
+    let instants = select(1u, 3u, frame.nodes > 1u);
+    for (var i = 0u; i < instants; i++) {
+        let pose = pose_along(pixel, select(0.5, 0.5 * f32(i), instants > 1u));
         if (near_edge(ray.uv, pose)) {
             for (var k = 0; k < 4; k++) {
                 let uv = ray.uv + (f32(k & 1) - 0.5) * ray.d_dx + (f32(k >> 1u) - 0.5) * ray.d_dy;

@@ -317,7 +317,7 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         console.line(format_args!(
             "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
-        let where_ = if predicted.plain_silhouettes.is_some() { "in all" } else { "without silhouettes" };
+        let where_ = if predicted.silhouettes.is_some() { "in all" } else { "without silhouettes" };
         let verdict = if *kept { "kept" } else { "BROKEN" };
         console.line(format_args!(
             "       | {where_} {rms_dn:.2}/255 (RMS), predicted {predicted_dn:.2}: quality.max_error_dn is {verdict}; without silhouettes predicted {}",
@@ -329,7 +329,7 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
 
 /// PSNR of the pixels that `quality.max_error_dn` bounds.
 fn bounded_db(errors: &ImageErrors, predicted: &Predicted) -> f64 {
-    if predicted.plain_silhouettes.is_some() { errors.all_db } else { errors.smooth_db }
+    if predicted.silhouettes.is_some() { errors.all_db } else { errors.smooth_db }
 }
 
 /// A PSNR as RMS error in 1/255.

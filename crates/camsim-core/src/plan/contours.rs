@@ -5,6 +5,8 @@
 //! between the two surfaces a pixel looks where the other one is. Both are a share of the contrast across the border. How wide the strip within
 //! parallax is the rays around the probes tell; a few silhouettes have most of it, at which hardly any probe stands, so that the share that holes
 //! have of the picture (`holes.rs`) is asked too.
+//!
+//! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of its pixels where the border is.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -25,12 +27,17 @@ const STRIPS: f64 = 2.0;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
 const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
-/// Price of marks, samples and rays for a picture that is all silhouettes, bilinear reads of an output pixel: rough, from frame times on llvmpipe.
-const RAYS_PRICE: f64 = 4000.0;
+/// Part of what stairs cost, squared, that rays leave of it.
+const RAYS_LEAVE: f64 = 0.42;
+/// Price of marks, samples and rays for a picture that is all silhouettes, bilinear reads of an output pixel: from frame times on llvmpipe. So much more
+/// for ideal frames of more pixels, and by fine pixels along a side of each.
+const RAYS_PRICE: f64 = 1900.0;
+const MORE_FOR_SCALE: f64 = 0.15;
+const FINE_TIMES: [f64; 3] = [1.0, 4.5, 6.0];
 /// Lines of three through three by three places, the border's first.
 pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
-/// What silhouettes cost if they are left as the ideal frame's pixels show them.
+/// What silhouettes cost, as they are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Contours {
     /// Share of the pixels within 3 px of one, folds of depth included.
@@ -97,15 +104,26 @@ impl Contour {
 }
 
 impl Outlook {
-    /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel.
-    pub fn price_of_rays(&self) -> f64 {
-        RAYS_PRICE * self.share
+    /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel, with so many ideal pixels for each of the
+    /// camera's and fine pixels for each of them, along a side.
+    pub fn price_of_rays(&self, scale: f64, fine: u32) -> f64 {
+        let times = FINE_TIMES[(fine.max(1) as usize - 1).min(FINE_TIMES.len() - 1)];
+        RAYS_PRICE * self.share * (1.0 + MORE_FOR_SCALE * (scale * scale - 1.0)) * times
     }
 
-    /// With so many ideal pixels for each of the camera's.
-    pub fn at_scale(&self, scale: f64) -> Contours {
-        let Self { share, contrast_dn, hidden_share, squares: [stairs, strips] } = *self;
-        let error_dn = 255.0 * (stairs / (scale * scale) + strips).sqrt();
+    /// Left as they are, with so many ideal pixels for each of the camera's.
+    pub fn plain(&self, scale: f64) -> Contours {
+        self.of(self.squares[0] / (scale * scale) + self.squares[1])
+    }
+
+    /// With rays of their own: a border is known to a part of a fine pixel.
+    pub fn with_rays(&self, scale: f64, fine: u32) -> Contours {
+        self.of(RAYS_LEAVE * self.squares[0] / (scale * f64::from(fine)).powi(2))
+    }
+
+    fn of(&self, square: f64) -> Contours {
+        let Self { share, contrast_dn, hidden_share, .. } = *self;
+        let error_dn = 255.0 * square.sqrt();
         let at_dn = if share > 0.0 { error_dn / share.sqrt() } else { 0.0 };
         Contours { share, contrast_dn, hidden_share, at_dn, error_dn }
     }
@@ -115,11 +133,6 @@ impl Contours {
     /// Whether they cost little enough of a tolerance.
     pub(super) fn are_affordable(&self, max_error_dn: f64) -> bool {
         self.error_dn <= SHARE * max_error_dn && self.at_dn <= TIMES_AT * max_error_dn
-    }
-
-    /// What is left of a tolerance for all else where silhouettes are left as they are; `None` where they cost too much of it.
-    pub(super) fn leaves_dn(&self, max_error_dn: f64) -> Option<f64> {
-        self.are_affordable(max_error_dn).then(|| (max_error_dn * max_error_dn - self.error_dn * self.error_dn).sqrt())
     }
 }
 
@@ -238,17 +251,17 @@ mod tests {
 
     #[test]
     fn a_roof_has_its_border_and_contrast() {
-        let found = outlook(0.0, 1.0, Holes::default()).at_scale(1.0);
+        let found = outlook(0.0, 1.0, Holes::default()).plain(1.0);
         // 100 px a side: a band of 6 px along 400 px, of 120 000.
         assert!((found.share / 0.02 - 1.0).abs() < 0.5, "{found:?}");
         assert!((found.contrast_dn - 255.0).abs() < 1e-3, "{found:?}");
-        let half = outlook(0.0, 0.5, Holes::default()).at_scale(1.0);
+        let half = outlook(0.0, 0.5, Holes::default()).plain(1.0);
         assert_eq!((half.contrast_dn, half.error_dn), (0.5 * found.contrast_dn, 0.5 * found.error_dn));
     }
 
     #[test]
     fn strips_are_those_within_parallax_and_those_that_are_hidden() {
-        let outlook_of = |holes| outlook(0.0, 1.0, holes).at_scale(f64::INFINITY);
+        let outlook_of = |holes| outlook(0.0, 1.0, holes).plain(f64::INFINITY);
         let found = outlook_of(Holes::default());
         // At the roof's two borders across the flight 50 px from the middle: a sixth of the readout from its middle the camera has flown 2/3 m, and
         // (1/100 - 1/150) of that is between roof and ground.
@@ -264,12 +277,15 @@ mod tests {
     #[test]
     fn finer_ideal_frames_and_blur_leave_less() {
         let still = outlook(0.0, 1.0, Holes::default());
-        let [coarse, fine] = [1.0, 2.0].map(|scale| still.at_scale(scale).at_dn);
+        let [coarse, fine] = [1.0, 2.0].map(|scale| still.plain(scale).at_dn);
         assert!(fine < coarse && fine > 0.5 * coarse, "the strips stay: {fine} {coarse}");
-        let blurred = outlook(20.0, 1.0, Holes::default()).at_scale(1.0);
+        let blurred = outlook(20.0, 1.0, Holes::default()).plain(1.0);
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);
         // White on black costs more than a 255th; nothing is left of it.
-        assert!(blurred.leaves_dn(1.0).is_none());
-        assert!(blurred.leaves_dn(16.0).is_some_and(|left_dn| left_dn < 16.0));
+        assert!(!blurred.are_affordable(1.0) && blurred.are_affordable(16.0), "{blurred:?}");
+        let rays = still.with_rays(1.0, 1);
+        assert!(rays.error_dn < still.plain(1.0).error_dn);
+        assert_eq!(still.with_rays(2.0, 1), still.with_rays(1.0, 2));
+        assert!(still.price_of_rays(1.0, 2) > still.price_of_rays(2.0, 1), "more pixels cost less than finer ones");
     }
 }

@@ -217,11 +217,10 @@ impl Predicted {
             let share = 100.0 * share;
             writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
-        let plain =
-            self.plain_silhouettes.map_or_else(String::new, |plain| format!(", {:.2} by silhouettes left as they are", plain.error_dn));
+        let silhouettes = self.silhouettes.map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{plain}: {}",
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{silhouettes}: {}",
             if self.levels_kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" }
         )?;
         match &self.levels_in_the_way {

@@ -20,10 +20,8 @@ const BLOCK_CELLS: u32 = 8;
 const FACING_MARGIN: f64 = 0.95;
 /// From this tolerance (1/255 RMS) on silhouettes are left as one sample a pixel shows them.
 pub(super) const IGNORED_DN: f64 = 16.0;
-/// From this tolerance (1/255 RMS over the picture) on one fine pixel a pixel with 4 samples does, else 9 with 36 samples are drawn. 4
-/// samples leave 33 to 36 dB at silhouettes of full contrast (44 with 36), or 5/255; with a hundredth of the pixels at silhouettes that is
-/// 0.5/255 over the picture.
-const COARSE_DN: f64 = 1.0;
+/// Most fine pixels along a side of an ideal pixel.
+pub(super) const MOST_FINE: u32 = 3;
 /// Depth of 4 samples and the border between them, and with more than one fine pixel a pixel the colours of the samples.
 pub(super) const FINE_PIXEL_BYTES: u64 = 4 * 4 + 8 + 4 * 8;
 /// Memory that one supersampled ideal frame may take; with more pixels it has 4 fine pixels a pixel instead of 9.
@@ -155,6 +153,8 @@ pub(super) struct EdgeCase<'a> {
     pub reason_for_none: Option<&'a str>,
     /// What silhouettes cost that are left as they are, if they are to be.
     pub plain: Option<&'a Contours>,
+    /// Fine pixels along a side of an ideal pixel, if there is memory for them.
+    pub fine: u32,
     /// Whether depth and coordinates are wanted.
     pub truth: bool,
 }
@@ -181,10 +181,7 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
     let fits = |scale: u64| {
         width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
     };
-    let scale = match quality.max_error_dn < COARSE_DN {
-        false => 1,
-        true => [3, 2].into_iter().find(|&scale| fits(u64::from(scale))).unwrap_or(1),
-    };
+    let scale = (2..=case.fine).rev().find(|&scale| fits(u64::from(scale))).unwrap_or(1);
     // Ground is not thin. What is drawn in colour keeps its order of drawing.
     let thin = scale > 1 || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
     EdgeStage::Supersampled { scale, samples: samples(scale, blur), thin }

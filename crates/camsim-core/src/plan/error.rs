@@ -73,9 +73,10 @@ pub struct Predicted {
     pub resampling_dn: f64,
     /// The same of too few samples over the exposure.
     pub blur_dn: f64,
-    /// What silhouettes cost that are left as the ideal frame's pixels show them; `None` where none is, or none can be in view.
-    pub plain_silhouettes: Option<Contours>,
-    /// Whether all three are within `quality.max_error_dn`.
+    /// What silhouettes cost, as they are made: left as the ideal frame's pixels show them, or with rays of their own. `None` where none can be in view, or
+    /// nobody asks.
+    pub silhouettes: Option<Contours>,
+    /// Whether all three together are within `quality.max_error_dn`.
     pub levels_kept: bool,
     /// If not: what is in the way.
     pub levels_in_the_way: Option<String>,
@@ -99,12 +100,11 @@ pub struct Predicted {
 }
 
 impl Predicted {
-    /// What `quality.max_error_dn` bounds, all together: RMS over the picture, 1/255 of the linear range. Where silhouettes have rays of their own,
-    /// what these leave is not in it.
+    /// What `quality.max_error_dn` bounds, all together: RMS over the picture, 1/255 of the linear range.
     #[must_use]
     pub fn picture_dn(&self) -> f64 {
-        let plain_dn = self.plain_silhouettes.map_or(0.0, |plain| plain.error_dn);
-        self.resampling_dn.hypot(self.blur_dn).hypot(plain_dn)
+        let at_silhouettes_dn = self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
+        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn)
     }
 }
 
@@ -124,8 +124,8 @@ pub(super) struct Case<'a> {
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
     pub levels_in_the_way: Option<String>,
-    /// Cost of silhouettes that are left as they are.
-    pub plain: Option<Contours>,
+    /// Cost of silhouettes.
+    pub silhouettes: Option<Contours>,
     pub silhouettes_in_view: bool,
     /// Whether the camera's twist at the key instant may stand for its motion.
     pub constant_twist: bool,
@@ -426,7 +426,7 @@ impl Forecast<'_> {
             format_px,
             resampling_dn,
             blur_dn,
-            plain_silhouettes: case.plain,
+            silhouettes: case.silhouettes,
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,

@@ -9,6 +9,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
 
+use super::transfer::sin_pi;
 use crate::scene::{Scene, Texture};
 
 /// Side of the pieces of a texture.
@@ -166,9 +167,8 @@ fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
 
 /// What the mean of `count` texels leaves of a wave, `cycles` a texel: `sin(pi n f) / (n sin(pi f))`.
 pub(super) fn mean_of(count: u32, cycles: f64) -> f64 {
-    let (half, n) = (std::f64::consts::PI * cycles, f64::from(count));
-    let one = half.sin();
-    if one.abs() < 1e-9 { 1.0 } else { (n * half).sin() / (n * one) }
+    let (n, one) = (f64::from(count), sin_pi(cycles));
+    if one.abs() < 1e-6 { 1.0 } else { sin_pi(n * cycles) / (n * one) }
 }
 
 /// A piece of a picture in linear light.

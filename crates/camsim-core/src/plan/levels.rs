@@ -11,9 +11,10 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, Contours, FramePlan, LensReach, SurfaceReads,
+    BlurStage, FramePlan, LensReach, SurfaceReads,
     exposure::ExposurePath,
     grain::{SceneGrain, Spectrum},
+    picture::Picture,
     probes::Probe,
     surfaces::{FOG_AT_VISIBILITY, Met, Surfaces},
     transfer::{Path, SurfaceFilter, error2, sinc},
@@ -29,7 +30,8 @@ use crate::{
     temporal::{Footprint, TapStage, samples_for},
 };
 
-/// Probes that are looked at, at most.
+/// One probe in so many is looked at, not in step with the grid of 24 columns, and so many of these are taken at most.
+const PROBE_STEP: usize = 5;
 const SIGHTS: usize = 32;
 /// Of which one in so many are asked first, and how far above the tolerance they then settle it.
 const FEW: usize = 4;
@@ -49,10 +51,16 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
-/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], and a read of the spline. Rough, from the passes'
-/// times on llvmpipe (docs/PERFORMANCE.md). What silhouettes cost hardly depends on the ideal frame's scale: more samples, but fewer rays.
-const IDEAL_COSTS: [f64; 3] = [8.0, 10.5, 15.0];
-const SPLINE_COST: f64 = 7.0;
+/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], a read of the spline of a sharp picture, and of one
+/// with an exposure, where the whole path is laid out for it first. From frame times on llvmpipe with 2 to 16 samples and ideal frames of
+/// 1 to 4 times the pixels, one such read 2.4 ms at 640x480.
+const IDEAL_COSTS: [f64; 3] = [4.3, 5.6, 8.0];
+/// Of terrain's triangles: for an ideal frame of one pixel for each of the camera's, and for each ideal pixel, since a finer frame shows more of them.
+const TERRAIN_COSTS: [f64; 2] = [7.5, 4.0];
+const SPLINE_COST: f64 = 5.0;
+const BLUR_SPLINE_COSTS: [f64; 2] = [8.0, 3.4];
+/// Where no way keeps a tolerance: times the least error there is.
+pub(super) const NEARLY: f64 = 1.15;
 /// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.
 const WORTH: f64 = 0.2;
 
@@ -80,13 +88,27 @@ pub(super) struct Sampling {
     pub expected: Expected,
 }
 
+/// What a sampling is chosen for.
+pub(super) struct Task<'a> {
+    pub quality: &'a QualitySpec,
+    /// 1/255 of the linear range, over the picture.
+    pub max_error_dn: f64,
+    /// Scales of the ideal frame: not below the one, and below the other.
+    pub least_scale: f64,
+    pub most_scale: f64,
+    /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
+    pub ideal_share: f64,
+    pub exposure: Option<ExposurePath>,
+}
+
 /// What was chosen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub sampling: Sampling,
     /// Bilinear reads of an output pixel.
     pub price: f64,
-    /// Whether it is within the tolerance.
+    /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the tolerance.
+    pub total_dn: f64,
     pub within: bool,
 }
 
@@ -111,12 +133,13 @@ struct Sight<'a> {
 /// The places of a frame.
 pub(super) struct Prospect<'a> {
     sights: Vec<Sight<'a>>,
-    /// Probes that count: those that the places stand for, and the sky.
+    /// Probes that count, of those looked at: those that the places stand for, and the sky.
     counted: usize,
     /// Of the camera, and but for whole pixels of every ideal frame.
     principal_px: DVec2,
     /// Widest output pixel, camera px.
     widest: f64,
+    has_terrain: bool,
 }
 
 impl<'a> Prospect<'a> {
@@ -158,7 +181,7 @@ impl<'a> Prospect<'a> {
                 path_px: path.1,
             })
         };
-        let seen: Vec<Seen<'_>> = probes.par_iter().map(sight).collect();
+        let seen: Vec<Seen<'_>> = probes.par_iter().step_by(PROBE_STEP).map(sight).collect();
         let counted = seen.iter().filter(|seen| !matches!(seen, Seen::Several)).count();
         let sights = seen.into_iter().filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None }).collect();
         let width = |probe: &Probe| {
@@ -166,7 +189,8 @@ impl<'a> Prospect<'a> {
             sides.x_axis.length().max(sides.y_axis.length())
         };
         let widest = probes.iter().map(width).fold(0.0, f64::max);
-        Self { sights: few_of(sights), counted, principal_px: reach.camera.principal_point_px, widest }
+        let has_terrain = sequence.scene.terrain.is_some();
+        Self { sights: few_of(sights), has_terrain, counted, principal_px: reach.camera.principal_point_px, widest }
     }
 
     /// What is to be expected of a way of sampling.
@@ -189,7 +213,7 @@ impl<'a> Prospect<'a> {
             let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip(), surface_reads);
             let samples = blur.map(|blur| sample_count(&blur, scale * sight.path_px, &area));
             let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
-            let path = samples.map(|samples| Path { along: scale * sight.path, samples });
+            let path = samples.map(|samples| Path { along: scale * sight.path, samples: sight.apart(samples) });
             let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
             let weight = sight.weight * sight.gain * sight.gain;
             [sight.weight, weight * error[0], weight * error[1]]
@@ -206,19 +230,12 @@ impl<'a> Prospect<'a> {
         self.sights.iter().map(|sight| sight.weight).sum::<f64>().max(1e-9)
     }
 
-    /// The cheapest sampling within the tolerance (1/255, of an ideal frame of a scale; `None` is none), or the best there is. The scale is
-    /// not below `least_scale`, and that at which the frame does not fit is left out. `ideal_share`: pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
-    pub fn choose(
-        &self,
-        quality: &QualitySpec,
-        tolerance_dn: impl Fn(f64) -> Option<f64>,
-        least_scale: f64,
-        ideal_share: f64,
-        exposure: Option<ExposurePath>,
-        fits: impl Fn(f64) -> bool,
-    ) -> Choice {
+    /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is what comes to it over the picture with an ideal frame of a
+    /// scale, 1/255; `None` where that scale is not to be.
+    pub fn choose(&self, task: &Task<'_>, beside_dn: &dyn Fn(f64) -> Option<f64>) -> Choice {
+        let &Task { quality, max_error_dn, least_scale, most_scale, ideal_share, exposure } = task;
         let forced = quality.ideal_scale.value();
-        let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && fits(scale));
+        let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && scale < most_scale);
         let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
         let per_px = |scale: f64| match quality.blur_samples.value() {
             Some(samples) => vec![f64::from(samples)],
@@ -239,56 +256,66 @@ impl<'a> Prospect<'a> {
             .map(|sampling| (cost(&fewest(&sampling)), sampling))
             .collect();
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let price = |cost: f64, total_dn: f64, tolerance_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / tolerance_dn));
+        let price = |cost: f64, total_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / max_error_dn));
         // A few places tell what is far from keeping the tolerance.
         let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, &sampling, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
             let expected = self.expected(&sampling, blur);
             Sampling { expected, ..sampling }
         };
-        let mut best: Option<(f64, (Sampling, Option<BlurStage>))> = None;
-        let mut cheapest: Option<(f64, Sampling)> = None;
+        let mut failed: Vec<(f64, f64, Sampling)> = Vec::new();
+        let mut cheapest: Option<(f64, f64, Sampling)> = None;
         for (least_cost, sampling) in ways {
-            let below = cheapest.map_or(f64::INFINITY, |(price, _)| price);
-            if price(least_cost, 0.0, 1.0) >= below {
+            let below = cheapest.map_or(f64::INFINITY, |(price, ..)| price);
+            if price(least_cost, 0.0) >= below {
                 break;
             }
-            let Some(tolerance_dn) = tolerance_dn(sampling.scale) else { continue };
+            let Some(beside_dn) = beside_dn(sampling.scale) else { continue };
+            let in_all_dn = |sampling: &Sampling| sampling.expected.total_dn().hypot(beside_dn);
             // The most samples first: if those do not do, fewer need not be tried.
             let choices = choices(sampling.scale);
             let Some((&last, fewer)) = choices.split_last() else { continue };
             let most = way(sampling, last);
-            let rough_dn = roughly_dn(most);
-            let tried = Some(most).filter(|_| rough_dn <= FAR * tolerance_dn).map(exactly);
-            let total_dn = tried.map_or(rough_dn, |tried| tried.expected.total_dn());
-            match tried.filter(|_| total_dn <= tolerance_dn) {
-                None if best.is_none_or(|(dn, _)| total_dn < 0.95 * dn) => best = Some((total_dn, most)),
-                None => {}
+            let rough_dn = roughly_dn(most).hypot(beside_dn);
+            let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
+            let total_dn = tried.as_ref().map_or(rough_dn, in_all_dn);
+            match tried.filter(|_| total_dn <= max_error_dn) {
+                None => failed.push((total_dn, beside_dn, sampling)),
                 Some(tried) => {
-                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0, 1.0) < below);
-                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * tolerance_dn).map(|way| (cost(&way), exactly(way)));
-                    let enough = near.filter(|(_, sampling)| sampling.expected.total_dn() <= tolerance_dn);
+                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0) < below);
+                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * max_error_dn).map(|way| (cost(&way), exactly(way)));
+                    let enough = near.filter(|(_, sampling)| in_all_dn(sampling) <= max_error_dn);
                     let priced =
-                        enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, way.expected.total_dn(), tolerance_dn), way));
-                    let found = priced.filter(|(price, _)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
+                        enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, in_all_dn(&way)), in_all_dn(&way), way));
+                    let found = priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }
             }
         }
-        if let Some((price, sampling)) = cheapest {
-            return Choice { sampling, price, within: true };
+        if let Some((price, total_dn, sampling)) = cheapest {
+            return Choice { sampling, price, total_dn, within: true };
         }
-        let none = Sampling { samples_per_px: 2.0, ..Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline) };
-        let (sampling, price) = best.map_or((none, f64::INFINITY), |(_, way)| (exactly(way), cost(&way)));
-        Choice { sampling, price, within: false }
+        // The cheapest of those that come near the best, with no more samples than that takes.
+        let enough_dn = NEARLY * failed.iter().map(|(total_dn, ..)| *total_dn).fold(f64::INFINITY, f64::min);
+        let none = (f64::INFINITY, 0.0, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
+        let (_, beside_dn, sampling) = failed.into_iter().find(|(total_dn, ..)| *total_dn <= enough_dn).unwrap_or(none);
+        let of = |way: (Sampling, Option<BlurStage>)| {
+            let sampling = exactly(way);
+            Choice { sampling, price: cost(&way), total_dn: sampling.expected.total_dn().hypot(beside_dn), within: false }
+        };
+        let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
+        let enough_dn = NEARLY * tried.last().map_or(f64::INFINITY, |most| most.total_dn);
+        let enough = tried.into_iter().find(|choice| choice.total_dn <= enough_dn);
+        enough.unwrap_or_else(|| of(way(sampling, 0.0)))
     }
 
     /// A way of sampling that another frame has chosen.
-    pub fn given(&self, sampling: &Sampling, quality: &QualitySpec, ideal_share: f64, exposure: Option<ExposurePath>) -> Choice {
-        let blur = sampling.tried(quality, exposure);
+    pub fn given(&self, sampling: &Sampling, task: &Task<'_>, beside_dn: f64) -> Choice {
+        let blur = sampling.tried(task.quality, task.exposure);
         let expected = self.expected(sampling, blur);
-        let within = expected.total_dn() <= quality.max_error_dn;
-        Choice { sampling: Sampling { expected, ..*sampling }, price: self.cost(sampling, blur, ideal_share), within }
+        let total_dn = expected.total_dn().hypot(beside_dn);
+        let price = self.cost(sampling, blur, task.ideal_share);
+        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= task.quality.max_error_dn }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -308,11 +335,17 @@ impl<'a> Prospect<'a> {
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let reads = blur.map_or(area.taps[0] * area.taps[1], |blur| sample_count(&blur, scale * sight.path_px, &area));
-            sight.weight * f64::from(reads) * if area.spline.is_some() { SPLINE_COST } else { 1.0 }
+            let cost = match blur.map(|blur| f64::from(sample_count(&blur, scale * sight.path_px, &area))) {
+                None if area.spline.is_some() => SPLINE_COST,
+                None => f64::from(area.taps[0] * area.taps[1]),
+                Some(samples) if area.spline.is_some() => BLUR_SPLINE_COSTS[0] + BLUR_SPLINE_COSTS[1] * samples,
+                Some(samples) => samples,
+            };
+            sight.weight * cost
         };
         let reads = self.sights.iter().map(of).sum::<f64>() / self.weight();
-        ideal_share * scale * scale * IDEAL_COSTS[surface_reads as usize] + reads
+        let [drawn, drawn_px] = if self.has_terrain { TERRAIN_COSTS } else { [0.0; 2] };
+        ideal_share * (drawn + scale * scale * (drawn_px + IDEAL_COSTS[surface_reads as usize])) + reads
     }
 }
 
@@ -370,6 +403,12 @@ fn dn(square: f64) -> f64 {
 }
 
 impl Sight<'_> {
+    /// Samples of the exposure that are at different places: where a path goes to and fro they may meet.
+    fn apart(&self, samples: u32) -> u32 {
+        let sweeps = self.path_px / self.path.length().max(1e-9);
+        ((f64::from(samples) / sweeps.max(1.0)).round() as u32).max(1)
+    }
+
     /// Power of the waves of two and four pixels: a measure to compare places by.
     fn hard_to_resample(&self) -> f64 {
         const DIRECTIONS: u32 = 3;
@@ -428,7 +467,7 @@ impl Shown {
     }
 }
 
-/// Path of the source over the exposure, camera px: from end to end, and its length.
+/// Path of the source over the exposure, camera px: between its places that are farthest apart, and its length.
 pub(super) fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2, inverse_depth: f64, focal_px: DVec2) -> (DVec2, f64) {
     const STRETCHES: u32 = 8;
     if exposure_s <= 0.0 {
@@ -443,19 +482,20 @@ pub(super) fn path_px(path: &CameraPath, mid_s: f64, exposure_s: f64, uv: DVec2,
     };
     let places: Vec<DVec2> = (0..=STRETCHES).map(place).filter(|at| at.is_finite()).collect();
     let length_px = places.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-    let first = places.first().copied().unwrap_or_default();
-    let farthest = places.iter().map(|at| *at - first).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-    (farthest.unwrap_or_default(), length_px)
+    let apart = places.iter().enumerate().flat_map(|(k, from)| places[k + 1..].iter().map(move |to| *to - *from));
+    let widest = apart.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+    (widest.unwrap_or_default(), length_px)
 }
 
 /// Why the tolerance is not kept; `None` if it is.
-pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected, plain: Option<&Contours>) -> Option<String> {
-    let plain_dn = plain.map_or(0.0, |plain| plain.error_dn);
-    if quality.preset == Preset::Paper || expected.total_dn().hypot(plain_dn) <= ROUNDED * quality.max_error_dn {
+pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected, picture: &Picture) -> Option<String> {
+    let at_silhouettes_dn = picture.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
+    if quality.preset == Preset::Paper || expected.total_dn().hypot(at_silhouettes_dn) <= ROUNDED * quality.max_error_dn {
         return None;
     }
-    if plain_dn > expected.total_dn() {
-        return Some(format!("quality.silhouettes: {plain_dn:.2}/255 where they are left as they are"));
+    if at_silhouettes_dn > expected.total_dn() {
+        let how = if picture.is_plain { "where they are left as they are" } else { "with rays of their own" };
+        return Some(format!("quality.silhouettes: {at_silhouettes_dn:.2}/255 {how}"));
     }
     let Expected { resampling_dn, blur_dn } = expected;
     Some(match (blur_dn > resampling_dn, quality.blur_samples, quality.footprint_taps, quality.ideal_scale) {

@@ -14,7 +14,11 @@ use std::{
 
 use rayon::prelude::*;
 
-use super::{FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds, bounds::View, levels::Sampling};
+use super::{
+    FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
+    bounds::View,
+    levels::{MOST_SCALE, Sampling},
+};
 use crate::scenario::{Auto, Preset, Silhouettes};
 
 /// Sharing must spare this part of the time.
@@ -115,7 +119,7 @@ impl Planner {
         let mut plans = vec![None; (frames.end - first) as usize];
         if frames.end - first > 1 {
             let middle = (first + frames.end) / 2;
-            if let Ok(own) = self.plan_from(middle, None) {
+            if let Ok(own) = self.plan_alone(middle) {
                 if !own.edges.has_rays() {
                     self.share(frames, &own, &mut plans);
                 }
@@ -153,14 +157,14 @@ impl Planner {
         for share_of_dn in SHARES {
             (common.share_of_dn, common.given) = (share_of_dn, None);
             // The outermost first: what they need is enough for the others, and where they fail nothing else is tried.
-            let first = self.plan_from(frames.start, Some(&common)).ok().filter(|plan| keeps_px(plan, own) && is_worth_it(plan))?;
+            let first = self.plan_shared(frames.start, &common).filter(|plan| keeps_px(plan, own) && is_worth_it(plan))?;
             common.given = Some(Sampling::of(&first));
             let common = &common;
-            let last = self.plan_from(last_frame, Some(common)).ok().filter(|plan| keeps_px(plan, own))?;
+            let last = self.plan_shared(last_frame, common).filter(|plan| keeps_px(plan, own))?;
             if !keeps_dn(&first, own) || !keeps_dn(&last, own) {
                 continue;
             }
-            let plan = |frame: u64| self.plan_from(frame, Some(common)).ok().filter(|plan| keeps_px(plan, own) && keeps_dn(plan, own));
+            let plan = |frame: u64| self.plan_shared(frame, common).filter(|plan| keeps_px(plan, own) && keeps_dn(plan, own));
             let between: Option<Vec<FramePlan>> = (frames.start + 1..last_frame).into_par_iter().map(plan).collect();
             let Some(between) = between else { continue };
             let plans: Vec<FramePlan> = [vec![first], between, vec![last]].concat();
@@ -170,6 +174,17 @@ impl Planner {
             }
         }
         None
+    }
+
+    /// The plan of a frame from a common ideal frame; `None` where silhouettes would cost too much, and for a fault.
+    fn plan_shared(&self, frame: u64, common: &Common) -> Option<FramePlan> {
+        let look = self.look(frame, Some(common)).ok()?;
+        let scenery = look.scenery();
+        let scale = common.given.as_ref().map_or(MOST_SCALE, |sampling| sampling.scale);
+        if !scenery.may_be_shared(&self.sequence.scenario.quality, scale) {
+            return None;
+        }
+        self.plan_of(&look, &scenery).ok()
     }
 
     /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth it.

@@ -90,8 +90,8 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
         if matches!(case.group, Group::Buildings | Group::AllEffects) {
             let with = |silhouettes| move |scenario: &mut Scenario| scenario.quality.silhouettes = silhouettes;
             row("silhouettes: plain", Family::Silhouettes, &with(Silhouettes::Plain));
-            row("silhouettes: 4 samples", Family::Silhouettes, &with(Silhouettes::Rays));
-            row("silhouettes: 36 samples", Family::Silhouettes, &|scenario| {
+            row("silhouettes: rays", Family::Silhouettes, &with(Silhouettes::Rays));
+            row("silhouettes: rays, 0.5/255", Family::Silhouettes, &|scenario| {
                 scenario.quality.max_error_dn = 0.5;
                 scenario.quality.silhouettes = Silhouettes::Rays;
             });

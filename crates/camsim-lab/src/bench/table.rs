@@ -219,7 +219,7 @@ impl Report {
             rows.filter_map(|row| Some((row, value(row)?))).collect::<Vec<_>>()
         };
         worst("all effects: at least 45 dB", 45.0, false, " dB", of_whole(DEFAULT, &|row| row.psnr_db));
-        for (what, knob) in [("", DEFAULT), (", 36 samples a pixel there", "silhouettes: 36 samples")] {
+        for (what, knob) in [("", DEFAULT), (", rays and a tolerance of 0.5/255", "silhouettes: rays, 0.5/255")] {
             worst(
                 &format!("all effects: at least 40 dB within 3 px of silhouettes{what}"),
                 40.0,

@@ -1,0 +1,142 @@
+//! What a frame looks at: all that its choices rest on.
+
+use std::sync::Arc;
+
+use super::{
+    IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges, error, exposure,
+    forced, levels, motion, paper, sharing, zoom_at,
+};
+use crate::{
+    mount::CameraPath,
+    pose::CameraPose,
+    scenario::{Preset, QualitySpec, Silhouettes},
+    temporal::displacement::Twist,
+};
+
+/// A frame before anything is chosen for it.
+pub(super) struct Look<'a> {
+    pub planner: &'a Planner,
+    pub frame: u64,
+    pub stamp_s: f64,
+    pub window_s: [f64; 2],
+    pub zoom: Option<f64>,
+    pub reach: Arc<LensReach>,
+    /// The ideal frame that others are made from too, if this one is to be.
+    pub common: Option<&'a sharing::Common>,
+    /// The key instant, the camera's pose and twist then.
+    pub key_s: f64,
+    pub key_pose: CameraPose,
+    pub key_twist: Twist,
+    /// The solver that the scenario asks for.
+    pub demanded: Option<TemporalStage>,
+}
+
+/// What it looks at.
+pub(super) struct Scenery<'a> {
+    /// Ideal frame of the least scale, and what moves in its pixels.
+    pub ideal: IdealGeometry,
+    pub motion: Motion,
+    pub prospect: levels::Prospect<'a>,
+    /// Why no silhouette can be in view, if none can.
+    pub reason_for_none: Option<String>,
+    /// What silhouettes cost; `None` where nobody asks.
+    pub outlook: Option<contours::Outlook>,
+}
+
+impl Planner {
+    /// Looks at a frame, by itself or from an ideal frame that others are made from too.
+    pub(super) fn look<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>) -> Result<Look<'a>, PlanError> {
+        let stamp_s = self.stamp_s(frame);
+        let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
+        let reach = match (&self.fixed, &self.zoom, zoom) {
+            (Some(reach), ..) => reach.clone(),
+            (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
+            _ => return Err(PlanError::NoRay),
+        };
+        let (first, last) = self.shutter.window_s();
+        let window_s = [stamp_s + first, stamp_s + last];
+        let path = &*self.sequence.path;
+        let key_s = common.map_or(0.5 * (window_s[0] + window_s[1]), |common| common.key_s);
+        let key_pose = path.pose(key_s);
+        let key_twist =
+            Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
+        let demanded = forced::temporal_stage(&self.sequence.scenario.quality);
+        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, key_s, key_pose, key_twist, demanded })
+    }
+}
+
+impl<'a> Look<'a> {
+    pub fn is_paper(&self) -> bool {
+        self.planner.sequence.scenario.quality.preset == Preset::Paper
+    }
+
+    pub fn key(&self) -> KeyFrame {
+        KeyFrame { t_s: self.key_s, pose: self.key_pose }
+    }
+
+    pub fn path(&self) -> &CameraPath {
+        &self.planner.sequence.path
+    }
+
+    /// Ideal frame that shows what a solver looks for in `keys`, or what all those do that are made from the common one.
+    pub fn geometry(&self, keys: &[KeyFrame], scale: f64, solver: Option<TemporalStage>) -> IdealGeometry {
+        let Self { planner, reach, stamp_s, key_s, .. } = self;
+        let displaced = solver.map(|stage| (stage, self.key_twist));
+        let own = || bounds::view(reach, self.path(), &planner.shutter, *stamp_s, *key_s, keys, &planner.surfaces, displaced);
+        self.common.map_or_else(own, |common| common.view).pixels(&reach.camera, scale)
+    }
+
+    /// What moves within the frame, in the pixels of an ideal frame.
+    pub fn motion_in(&self, ideal: &IdealGeometry) -> Motion {
+        let Planner { shutter, surfaces, .. } = self.planner;
+        motion::measure(&self.reach, self.path(), shutter, self.stamp_s, self.key_s, ideal, surfaces)
+    }
+
+    pub fn exposed(&self, motion: Motion, ideal: &IdealGeometry) -> exposure::Exposed<'_> {
+        let (path, shutter) = (self.path(), &self.planner.shutter);
+        exposure::Exposed { reach: &self.reach, path, shutter, stamp_s: self.stamp_s, focal_px: ideal.focal_px, motion }
+    }
+
+    pub fn scenery(&self) -> Scenery<'a> {
+        let Planner { sequence, shutter, surfaces, grain, outline, .. } = self.planner;
+        let Self { reach, stamp_s, key_pose, .. } = self;
+        let ideal = match self.is_paper() {
+            true => paper::ideal_geometry(&reach.camera),
+            false => self.geometry(&[self.key()], reach.least_scale(), self.demanded),
+        };
+        let motion = self.motion_in(&ideal);
+        let reason_for_none = outline.reason_for_none(&sequence.scene, key_pose, ideal.tangents(), motion.travel_m);
+        Scenery {
+            prospect: levels::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
+            outlook: self.outlook(&ideal, reason_for_none.is_none()),
+            ideal,
+            motion,
+            reason_for_none,
+        }
+    }
+
+    /// What silhouettes cost, where something depends on it.
+    fn outlook(&self, ideal: &IdealGeometry, in_view: bool) -> Option<contours::Outlook> {
+        let Planner { sequence, shutter, surfaces, .. } = self.planner;
+        let quality = &sequence.scenario.quality;
+        let ignored = quality.silhouettes == Silhouettes::Auto && quality.max_error_dn >= edges::IGNORED_DN;
+        if !in_view || self.is_paper() || ignored {
+            return None;
+        }
+        let &Self { stamp_s, key_s, ref key_pose, ref reach, key_twist, .. } = self;
+        let path = self.path();
+        let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: key_twist, nearest_depth: false };
+        let truths = error::Truths::of_silhouettes(reach, trial);
+        let (holes, least_share) = (truths.holes(&[self.key()], quality.max_error_px), truths.silhouette_share());
+        let gain = &levels::gain(sequence, &reach.camera);
+        Some(contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain, holes, least_share }.outlook())
+    }
+}
+
+impl Scenery<'_> {
+    /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
+    pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
+        let is_auto = quality.silhouettes == Silhouettes::Auto;
+        self.outlook.is_none_or(|outlook| !is_auto || outlook.plain(scale).are_affordable(quality.max_error_dn))
+    }
+}

@@ -1,0 +1,112 @@
+//! How a frame's picture is made: what reads the ideal frame and how fine that is, and whether pixels at silhouettes have rays of their own.
+
+use super::{
+    contours::{Contours, Outlook},
+    edges::MOST_FINE,
+    levels::{Choice, NEARLY, Prospect, Sampling, Task},
+    look::{Look, Scenery},
+};
+use crate::scenario::{Auto, Silhouettes};
+
+/// What was chosen.
+pub(super) struct Picture {
+    pub sampling: Sampling,
+    /// What silhouettes cost then.
+    pub silhouettes: Option<Contours>,
+    /// Whether they are left as they are, and if not, fine pixels along a side of each ideal one.
+    pub is_plain: bool,
+    pub fine: u32,
+    /// Time, bilinear reads of an output pixel.
+    pub price: f64,
+}
+
+impl Look<'_> {
+    /// The cheapest picture within `quality.max_error_dn`, or the best there is.
+    pub fn picture(&self, scenery: &Scenery<'_>) -> Picture {
+        if self.is_paper() {
+            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: 0.0 };
+        }
+        let quality = &self.planner.sequence.scenario.quality;
+        let max_error_dn = quality.max_error_dn * self.common.map_or(1.0, |common| common.share_of_dn);
+        let task = Task {
+            quality,
+            max_error_dn,
+            least_scale: self.reach.least_scale(),
+            most_scale: self.most_scale(scenery),
+            ideal_share: self.ideal_share(scenery),
+            exposure: self.exposed(scenery.motion, &scenery.ideal).path(quality, &mut Vec::new()),
+        };
+        let Scenery { prospect, outlook, .. } = scenery;
+        let given = self.common.and_then(|common| common.given);
+        let Some(outlook) = outlook else {
+            let choice = given.map_or_else(|| prospect.choose(&task, &|_| Some(0.0)), |given| prospect.given(&given, &task, 0.0));
+            return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
+        };
+        let plain = || match given {
+            Some(given) => prospect.given(&given, &task, outlook.plain(given.scale).error_dn),
+            None => prospect.choose(&task, &|scale| plain_dn(outlook, &task, scale)),
+        };
+        let with_rays = || with_rays(prospect, &task, outlook);
+        let (choice, is_plain, fine) = match quality.silhouettes {
+            Silhouettes::Plain => (plain(), true, 1),
+            // Another instant sees more of what is behind a silhouette than rays could make up for.
+            Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
+            Silhouettes::Auto if quality.key_frames == Auto::Auto => {
+                let plain = plain();
+                let is_cheaper = |price: f64| plain.within && plain.price < price;
+                if is_cheaper(outlook.price_of_rays(task.least_scale, 1)) {
+                    (plain, true, 1)
+                } else {
+                    let (with_rays, fine) = with_rays();
+                    let is_plain = is_cheaper(if with_rays.within { with_rays.price } else { f64::INFINITY });
+                    (if is_plain { plain } else { with_rays }, is_plain, fine)
+                }
+            }
+            Silhouettes::Auto | Silhouettes::Rays => {
+                let (with_rays, fine) = with_rays();
+                (with_rays, false, fine)
+            }
+        };
+        let scale = choice.sampling.scale;
+        let silhouettes = Some(if is_plain { outlook.plain(scale) } else { outlook.with_rays(scale, fine) });
+        Picture { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price }
+    }
+
+    /// Scale from which on the ideal frame is too large.
+    fn most_scale(&self, scenery: &Scenery<'_>) -> f64 {
+        let [width, height] = scenery.ideal.size_px;
+        f64::from(self.planner.max_side_px) / f64::from(width.max(height)) * self.reach.least_scale()
+    }
+
+    /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
+    fn ideal_share(&self, scenery: &Scenery<'_>) -> f64 {
+        let pixels = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+        let frames = self.common.map_or(1.0, |common| common.count() as f64);
+        pixels(scenery.ideal.size_px) / (pixels(self.reach.camera.size_px) * self.reach.least_scale().powi(2) * frames)
+    }
+}
+
+/// Error over the picture of silhouettes that are left as they are; `None` where that is not to be.
+fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
+    let plain = outlook.plain(scale);
+    (task.quality.silhouettes == Silhouettes::Plain || plain.are_affordable(task.max_error_dn)).then_some(plain.error_dn)
+}
+
+/// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
+/// that these are for what the finest ideal frame does not do.
+fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook) -> (Choice, u32) {
+    let choose = |fine: u32| {
+        let choice = prospect.choose(task, &|scale| Some(outlook.with_rays(scale, fine).error_dn));
+        (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
+    };
+    let mut failed = Vec::new();
+    for fine in 1..=MOST_FINE {
+        let (choice, fine) = choose(fine);
+        if choice.within {
+            return (choice, fine);
+        }
+        failed.push((choice, fine));
+    }
+    let least_dn = failed.iter().map(|(choice, _)| choice.total_dn).fold(f64::INFINITY, f64::min);
+    failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn).unwrap_or_else(|| choose(1))
+}
