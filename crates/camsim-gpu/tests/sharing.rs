@@ -9,7 +9,7 @@ use camsim_core::{
     plan::{FramePlan, PlanError, Planner, TemporalStage},
     pose::BodyState,
     reference::{Oracle, coord_errors},
-    scenario::{Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
     sequence::Sequence,
     trajectory::Trajectory,
 };
@@ -149,6 +149,7 @@ fn what_moves_too_far_is_not_shared() {
 #[test]
 fn a_fault_of_one_frame_is_its_own() {
     let mut spun = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 8));
+    spun.scenario.quality.ideal_scale = Auto::Value(1.0);
     let knot = |k: i32| BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -80.0),
         velocity_ned_m_s: DVec3::ZERO,

@@ -304,9 +304,8 @@ impl<'a> Prospect<'a> {
             Choice { sampling, price: cost(&way), total_dn: sampling.expected.total_dn().hypot(beside_dn), within: false }
         };
         let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
-        let enough_dn = NEARLY * tried.last().map_or(f64::INFINITY, |most| most.total_dn);
-        let enough = tried.into_iter().find(|choice| choice.total_dn <= enough_dn);
-        enough.unwrap_or_else(|| of(way(sampling, 0.0)))
+        let most = tried.last().copied();
+        tried.into_iter().find(|choice| choice.total_dn <= enough_dn).or(most).unwrap_or_else(|| of(way(sampling, 0.0)))
     }
 
     /// A way of sampling that another frame has chosen.
