@@ -40,7 +40,8 @@ fn camera() -> Scenario {
     scenario.camera.size_px = [200, 150];
     scenario.camera.focal_px = [160.0, 160.0];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
-    // A pixel of the ideal frame for each of the camera's, so that nothing lies between pixels; and the full surface, as the oracle has it.
+    // An ideal frame of its own with a pixel for each of the camera's, so that nothing lies between pixels; and the full surface, as the oracle has it.
+    scenario.quality.frames_per_ideal = 1;
     scenario.quality.ideal_scale = Auto::Value(1.0);
     scenario.quality.max_terrain_error_px = 1e-6;
     scenario

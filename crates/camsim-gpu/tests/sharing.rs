@@ -9,7 +9,7 @@ use camsim_core::{
     plan::{FramePlan, PlanError, Planner, TemporalStage},
     pose::BodyState,
     reference::{Oracle, coord_errors},
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
+    scenario::{Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
     sequence::Sequence,
     trajectory::Trajectory,
 };
@@ -149,7 +149,6 @@ fn what_moves_too_far_is_not_shared() {
 #[test]
 fn a_fault_of_one_frame_is_its_own() {
     let mut spun = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 8));
-    spun.scenario.quality.ideal_scale = Auto::Value(1.0);
     let knot = |k: i32| BodyState {
         position_ned_m: DVec3::new(0.0, 0.0, -80.0),
         velocity_ned_m_s: DVec3::ZERO,
@@ -161,8 +160,10 @@ fn a_fault_of_one_frame_is_its_own() {
     };
     let trajectory = Trajectory::uniform(-0.5 / 30.0, 1.0 / 30.0, 1.0, (4..36).map(knot).collect()).expect("knots");
     spun.path = Arc::new(CameraPath::new(trajectory, &spun.scenario.camera.mount).expect("a legal mount"));
-    let spun = Arc::new(spun);
-    let side = |frame| *planned(&spun, 16_384, frame).expect("a plan").ideal.size_px.iter().max().expect("two sides");
+    let mut own = spun.clone();
+    own.scenario.quality.frames_per_ideal = 1;
+    let (spun, own) = (Arc::new(spun), Arc::new(own));
+    let side = |frame| *planned(&own, 16_384, frame).expect("a plan").ideal.size_px.iter().max().expect("two sides");
     let [still, turned] = [0, 4].map(side);
     assert!(turned > still + 20, "{still} {turned}");
     let limit_px = (still + turned) / 2;

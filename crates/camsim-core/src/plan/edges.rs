@@ -153,7 +153,7 @@ pub(super) struct EdgeCase<'a> {
     pub reason_for_none: Option<&'a str>,
     /// What silhouettes cost that are left as they are, if they are to be.
     pub plain: Option<&'a Contours>,
-    /// Fine pixels along a side of an ideal pixel, if there is memory for them.
+    /// Fine pixels along a side of an ideal pixel.
     pub fine: u32,
     /// Whether depth and coordinates are wanted.
     pub truth: bool,
@@ -177,14 +177,19 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
         let thin = || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
         return if truth { EdgeStage::Supersampled { scale: 1, samples: 0, thin: thin() } } else { EdgeStage::None };
     }
-    let [width, height] = ideal.size_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
-    let fits = |scale: u64| {
-        width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
-    };
-    let scale = (2..=case.fine).rev().find(|&scale| fits(u64::from(scale))).unwrap_or(1);
+    let scale = most_fine(ideal.size_px, max_side_px).min(case.fine);
     // Ground is not thin. What is drawn in colour keeps its order of drawing.
     let thin = scale > 1 || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
     EdgeStage::Supersampled { scale, samples: samples(scale, blur), thin }
+}
+
+/// Fine pixels along a side of an ideal pixel that there is memory for.
+pub(super) fn most_fine(ideal_px: [u32; 2], max_side_px: u32) -> u32 {
+    let [width, height] = ideal_px.map(|side| u64::from(side.next_multiple_of(SIZE_QUANTUM_PX)));
+    let fits = |scale: u64| {
+        width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
+    };
+    (2..=MOST_FINE).rev().find(|&scale| fits(u64::from(scale))).unwrap_or(1)
 }
 
 /// Measured at straight edges of full contrast (scale 2): 32 rays reach 39 dB without exposure; with it 32, 64 and 256 reach 35, 36 and 40 dB. A long path

@@ -2,7 +2,7 @@
 
 use super::{
     contours::{Contours, Outlook},
-    edges::MOST_FINE,
+    edges,
     levels::{Choice, NEARLY, Prospect, Sampling, Task},
     look::{Look, Scenery},
 };
@@ -46,7 +46,13 @@ impl Look<'_> {
             Some(given) => prospect.given(&given, &task, outlook.plain(given.scale).error_dn),
             None => prospect.choose(&task, &|scale| plain_dn(outlook, &task, scale)),
         };
-        let with_rays = || with_rays(prospect, &task, outlook);
+        let with_rays = || {
+            let most_fine = |scale: f64| {
+                let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
+                edges::most_fine(size_px, self.planner.max_side_px)
+            };
+            with_rays(prospect, &task, outlook, &most_fine)
+        };
         let (choice, is_plain, fine) = match quality.silhouettes {
             Silhouettes::Plain => (plain(), true, 1),
             // Another instant sees more of what is behind a silhouette than rays could make up for.
@@ -94,13 +100,13 @@ fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
 
 /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
 /// that these are for what the finest ideal frame does not do.
-fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook) -> (Choice, u32) {
+fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
     let choose = |fine: u32| {
-        let choice = prospect.choose(task, &|scale| Some(outlook.with_rays(scale, fine).error_dn));
+        let choice = prospect.choose(task, &|scale| (fine <= most_fine(scale)).then(|| outlook.with_rays(scale, fine).error_dn));
         (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
     };
     let mut failed = Vec::new();
-    for fine in 1..=MOST_FINE {
+    for fine in 1..=edges::MOST_FINE {
         let (choice, fine) = choose(fine);
         if choice.within {
             return (choice, fine);
