@@ -37,6 +37,7 @@ mod motion;
 pub mod paper;
 mod picture;
 mod probes;
+mod prospect;
 mod rounding;
 mod sharing;
 mod sight;

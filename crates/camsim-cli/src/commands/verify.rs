@@ -106,8 +106,8 @@ struct Figures {
 /// PSNR in dB on linear values, peak 1; `null` where there are no pixels or no difference.
 #[derive(Serialize)]
 struct Picture {
-    /// RMS, 1/255 of the linear range, of what `quality.max_error_dn` bounds: of the whole picture where silhouettes are left as they are, otherwise without
-    /// them.
+    /// RMS, 1/255 of the linear range, of what `quality.max_error_dn` bounds: of the whole picture; without pixels at silhouettes where the plan does not ask
+    /// for what they cost.
     rms_dn: f64,
     predicted_dn: f64,
     /// Whether that is within the tolerance.

@@ -12,7 +12,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Holes, LensReach, levels::path_px, probes::Probe, surfaces::Surfaces};
+use super::{Holes, LensReach, probes::Probe, prospect::path_px, surfaces::Surfaces};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges, error, exposure,
-    forced, levels, motion, paper, sharing, zoom_at,
+    forced, motion, paper, prospect, sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -36,7 +36,7 @@ pub(super) struct Scenery<'a> {
     /// Ideal frame of the least scale, and what moves in its pixels.
     pub ideal: IdealGeometry,
     pub motion: Motion,
-    pub prospect: levels::Prospect<'a>,
+    pub prospect: prospect::Prospect<'a>,
     /// Why no silhouette can be in view, if none can.
     pub reason_for_none: Option<String>,
     /// What silhouettes cost; `None` where nobody asks.
@@ -107,7 +107,7 @@ impl<'a> Look<'a> {
         let motion = self.motion_in(&ideal);
         let reason_for_none = outline.reason_for_none(&sequence.scene, key_pose, ideal.tangents(), motion.travel_m);
         Scenery {
-            prospect: levels::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
+            prospect: prospect::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
             ideal,
             motion,
@@ -128,7 +128,7 @@ impl<'a> Look<'a> {
         let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: key_twist, nearest_depth: false };
         let truths = error::Truths::of_silhouettes(reach, trial);
         let (holes, least_share) = (truths.holes(&[self.key()], quality.max_error_px), truths.silhouette_share());
-        let gain = &levels::gain(sequence, &reach.camera);
+        let gain = &prospect::gain(sequence, &reach.camera);
         Some(contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain, holes, least_share }.outlook())
     }
 }

@@ -3,8 +3,9 @@
 use super::{
     contours::{Contours, Outlook},
     edges,
-    levels::{Choice, NEARLY, Prospect, Sampling, Task},
+    levels::{Choice, NEARLY, Sampling, Task},
     look::{Look, Scenery},
+    prospect::Prospect,
 };
 use crate::scenario::{Auto, Silhouettes};
 
@@ -59,12 +60,12 @@ impl Look<'_> {
             Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
-                let is_cheaper = |price: f64| plain.within && plain.price < price;
-                if is_cheaper(outlook.price_of_rays(task.least_scale, 1)) {
+                if plain.within && plain.price < outlook.price_of_rays(task.least_scale, 1) {
                     (plain, true, 1)
                 } else {
                     let (with_rays, fine) = with_rays();
-                    let is_plain = is_cheaper(if with_rays.within { with_rays.price } else { f64::INFINITY });
+                    let is_as_good = if with_rays.within { plain.within } else { plain.total_dn <= NEARLY * with_rays.total_dn };
+                    let is_plain = plain.within && !with_rays.within || is_as_good && plain.price < with_rays.price;
                     (if is_plain { plain } else { with_rays }, is_plain, fine)
                 }
             }
