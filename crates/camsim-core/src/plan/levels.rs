@@ -205,7 +205,7 @@ impl Prospect<'_> {
         }
         // The cheapest of those that come near the best, with no more samples than that takes.
         let enough_dn = NEARLY * failed.iter().map(|(total_dn, ..)| *total_dn).fold(f64::INFINITY, f64::min);
-        let none = (f64::INFINITY, 0.0, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
+        let none = (f64::INFINITY, f64::INFINITY, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
         let (_, beside_dn, sampling) = failed.into_iter().find(|(total_dn, ..)| *total_dn <= enough_dn).unwrap_or(none);
         let of = |way: (Sampling, Option<BlurStage>)| {
             let sampling = exactly(way);
