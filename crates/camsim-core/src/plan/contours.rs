@@ -12,7 +12,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Holes, LensReach, probes::Probe, prospect::path_px, surfaces::Surfaces};
+use super::{Holes, LensReach, edges::MOST_FINE, probes::Probe, prospect::path_px, surfaces::Surfaces};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
@@ -33,7 +33,7 @@ const RAYS_LEAVE: f64 = 0.42;
 /// for ideal frames of more pixels, and by fine pixels along a side of each.
 const RAYS_PRICE: f64 = 1900.0;
 const MORE_FOR_SCALE: f64 = 0.15;
-const FINE_TIMES: [f64; 3] = [1.0, 4.5, 6.0];
+const FINE_TIMES: [f64; MOST_FINE as usize] = [1.0, 4.5, 6.0];
 /// Lines of three through three by three places, the border's first.
 pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
@@ -107,7 +107,7 @@ impl Outlook {
     /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel, with so many ideal pixels for each of the
     /// camera's and fine pixels for each of them, along a side.
     pub fn price_of_rays(&self, scale: f64, fine: u32) -> f64 {
-        let times = FINE_TIMES[(fine.max(1) as usize - 1).min(FINE_TIMES.len() - 1)];
+        let times = FINE_TIMES[fine.clamp(1, MOST_FINE) as usize - 1];
         RAYS_PRICE * self.share * (1.0 + MORE_FOR_SCALE * (scale * scale - 1.0)) * times
     }
 

@@ -82,8 +82,7 @@ pub struct Predicted {
     pub levels_in_the_way: Option<String>,
     /// All together: the bound on the 99th percentile.
     pub total_px: f64,
-    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. Of one probe in five, so to within some
-    /// hundredths, and too low where folds of depth lie between the nine rays that look for them.
+    /// Share of the pixels that are counted apart: at a silhouette or not seen from the key pose. To within some hundredths, and too low where folds of depth lie between the nine rays that look for them.
     pub silhouette_share: f64,
     /// Share of the probes that have a ray but no source: what they see lies outside of the ideal frame, and their pixels stay empty.
     pub void_share: f64,
@@ -192,7 +191,7 @@ pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, mo
     };
     let mut predicted = forecast.predict(case, way);
     if case.silhouettes_in_view {
-        predicted.silhouette_share = truths.silhouette_share();
+        predicted.silhouette_share = case.silhouettes.map_or_else(|| truths.silhouette_share(), |silhouettes| silhouettes.share);
     }
     Choice { way, terrain_error_px, predicted, truths }
 }

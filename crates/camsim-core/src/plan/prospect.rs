@@ -16,6 +16,7 @@ use crate::{camera::CameraModel, mount::CameraPath, photometric::vignette_weight
 /// One probe in so many is looked at, not in step with the grid of 24 columns, and so many of these are taken at most.
 const PROBE_STEP: usize = 5;
 const SIGHTS: usize = 32;
+
 /// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
 pub(super) struct Sight<'a> {
     /// Probes that it stands for.
