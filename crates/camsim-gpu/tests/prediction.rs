@@ -257,6 +257,7 @@ fn a_tolerance_buys_what_it_says() {
             let mut scenario = scenario();
             scenario.quality.max_error_px = tolerance_px;
             scenario.quality.max_error_dn = 0.5;
+            scenario.quality.ideal_scale = Auto::Value(1.0);
             scenario.camera.size_px = [320, 240];
             scenario.camera.focal_px = [200.0, 200.0];
             scenario.camera.mount.angles_deg = [3.0, -75.0, 0.0];
@@ -270,8 +271,12 @@ fn a_tolerance_buys_what_it_says() {
                 plan.temporal, smooth.rms_px, smooth.p99_px, all.rms_px, all.max_px, plan.predicted.total_px
             );
             assert!(smooth.p99_px <= tolerance_px && smooth.rms_px <= tolerance_px, "{name} at {tolerance_px}");
+            // Between ground, walls and roofs depth has creases, where it is off by more between the ideal frame's pixels. They are too few to
+            // count in the percentile, but some probe may stand at one: the plan cannot be sure of the tighter tolerance, and says why.
             let predicted = &plan.predicted;
-            assert!(predicted.kept && predicted.in_the_way.is_none(), "{name} at {tolerance_px}: {:?}", predicted.in_the_way);
+            let sure = name != "buildings" || i == 0;
+            assert!(predicted.kept == sure && predicted.total_px < 5.0 * tolerance_px.max(smooth.p99_px), "{name} at {tolerance_px}");
+            assert_eq!(predicted.in_the_way.as_ref().map(|cause| cause.contains("depth between")), (!sure).then_some(true));
             if let TemporalStage::Reproject { iterations } = plan.temporal {
                 look_ups[i] += iterations;
             }
