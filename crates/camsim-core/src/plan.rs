@@ -62,6 +62,8 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
+/// Times that an exposure whose path the probes find to be missed gets more nodes.
+const MOST_REFINEMENTS: u32 = 3;
 
 /// Errors of planning.
 #[derive(Debug, thiserror::Error)]
@@ -300,19 +302,18 @@ impl Planner {
         let mut skipped = Vec::new();
         let camera = &look.reach.camera;
         let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
-        let (blur, edges) = if look.is_paper() {
+        let (mut exposure, blur, edges) = if look.is_paper() {
             skipped.push(Skip { what: "silhouette supersampling", reason: "quality.preset \"paper\" takes one sample a pixel".into() });
-            (paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
+            (None, paper::blur_stage(&self.shutter, quality, &mut skipped), EdgeStage::None)
         } else {
             let exposed = look.exposed(motion, &ideal);
             let exposure = exposed.path(quality, &mut skipped).map(|exposure| forced::exposure_path(demanded, exposure));
-            let staged = |exposure| sampling.blur_stage(exposure, quality, motion.blur_px);
             let case = edges::EdgeCase {
                 outline: &self.outline,
                 pose: &key_pose,
                 ideal: &ideal,
                 travel_m: motion.travel_m,
-                blur: exposure.map(staged),
+                blur: exposure.map(|exposure| sampling.blur_stage(exposure, quality, motion.blur_px)),
                 quality,
                 max_side_px: self.max_side_px,
                 reason_for_none: scenery.reason_for_none.as_deref(),
@@ -321,13 +322,11 @@ impl Planner {
                 truth: self.truth,
             };
             let edges = edges::edge_stage(&case, &mut skipped);
-            let has_rays = edges.has_rays() && demanded != Some(TemporalStage::Linear);
-            let with_poses = |exposure| if has_rays { exposed.with_poses_for_rays(exposure, quality) } else { exposure };
-            (exposure.map(with_poses).map(staged), edges)
+            (exposure, exposure.map(|exposure| look.blur_stage(exposure, edges, &sampling, motion, &ideal)), edges)
         };
         let expected = scenery.prospect.expected(&sampling, blur);
         let tried = ideal;
-        let case = error::Case {
+        let mut case = error::Case {
             reach: &look.reach,
             sequence: &self.sequence,
             shutter: &self.shutter,
@@ -346,7 +345,15 @@ impl Planner {
             constant_twist: look.common.is_none(),
             surfaces: &self.surfaces,
         };
-        let error::Choice { way, terrain_error_px, mut predicted, truths } = error::choose(&case, demanded, &motion);
+        let mut choice = error::choose(&case, demanded, &motion);
+        for _ in 0..MOST_REFINEMENTS {
+            let missed = Some(choice.predicted.nodes_px).filter(|_| !choice.predicted.kept && demanded != Some(TemporalStage::Linear));
+            let Some(finer) = exposure.zip(missed).and_then(|(exposure, px)| exposure.finer(px, quality.max_error_px)) else { break };
+            exposure = Some(finer);
+            case.blur = Some(look.blur_stage(finer, edges, &sampling, motion, &tried));
+            choice = error::choose(&case, demanded, &motion);
+        }
+        let error::Choice { way, terrain_error_px, mut predicted, truths } = choice;
         let error::Way { temporal, blur } = way;
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
             // These look, and read the depth, where the point is not.

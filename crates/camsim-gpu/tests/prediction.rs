@@ -116,7 +116,7 @@ fn frame(dice: &mut Dice, over_m: [f64; 2]) -> (Scenario, Trajectory) {
     camera.shutter = ShutterSpec {
         delay_ms: if dice.one_in(3.0) { dice.within(0.0, 100.0) } else { 0.0 },
         readout_ms: if dice.one_in(8.0) { 0.0 } else { dice.within(2.0, 60.0) },
-        exposure_ms: if dice.one_in(2.0) { 0.0 } else { dice.within(0.2, 20.0) },
+        exposure_ms: if dice.one_in(2.0) { 0.0 } else { dice.within(0.2, 20.0) * if dice.one_in(6.0) { 20.0 } else { 1.0 } },
         interlace_ms: FieldOr::Ms(if dice.one_in(6.0) { 20.0 } else { 0.0 }),
         readout: [Readout::TopToBottom, Readout::BottomToTop, Readout::LeftToRight, Readout::RightToLeft][dice.within(0.0, 4.0) as usize],
         ..ShutterSpec::default()
@@ -243,6 +243,49 @@ fn what_happens_between_the_ends_of_an_exposure_is_predicted() {
         let (measured_px, predicted_px) = (worst.smooth.p99_px, plan.predicted.total_px);
         eprintln!("{readout_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}; {:?} {:?}", plan.temporal, plan.blur);
         assert!(measured_px <= predicted_px, "{readout_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}");
+    }
+}
+
+/// A camera that moves far within the exposure: seen from its middle, where the ideal frame is taken, the depth matters least in the middle and at the ends of what a
+/// line between the depths of the ends tells, and most between them.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn long_exposures_are_predicted() {
+    let engine = engine();
+    for (exposure_ms, readout_ms, max_error_px) in [(60.0, 0.0, 2e-3), (250.0, 5.0, 0.01), (1000.0, 0.0, 0.05), (1000.0, 0.0, 5e-3)] {
+        let mut scenario = scenario();
+        scenario.quality.max_error_px = max_error_px;
+        scenario.camera.size_px = [160, 120];
+        scenario.camera.focal_px = [120.0, 120.0];
+        scenario.camera.mount.angles_deg = [0.0, -60.0, 0.0];
+        scenario.camera.shutter = ShutterSpec { readout_ms, exposure_ms, ..ShutterSpec::default() };
+        let sequence = sequence(scenario, steady(400.0, 30.0, DVec3::new(40.0, 20.0, 0.0), DVec3::new(0.0, 0.02, 0.05)), hills());
+        let Found { plan, worst, .. } = find(&engine, &sequence);
+        let (measured_px, predicted_px) = (worst.smooth.p99_px, plan.predicted.total_px);
+        eprintln!("{exposure_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}; {:?} {:?}", plan.temporal, plan.blur);
+        assert!(measured_px <= predicted_px, "{exposure_ms} ms: {measured_px:.2e} px, predicted {predicted_px:.2e}");
+    }
+}
+
+/// At the border of a fisheye's picture a path bends more than the outermost of a few rays tell: where the probes find so, it gets more nodes.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_path_that_is_missed_gets_more_nodes() {
+    let engine = engine();
+    for max_error_px in [5.0, 0.5, 0.05] {
+        let mut scenario = scenario();
+        scenario.quality.max_error_px = max_error_px;
+        let camera = &mut scenario.camera;
+        camera.size_px = [160, 120];
+        camera.focal_px = [60.0, 60.0];
+        camera.lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.02, 0.01, -0.005, 0.0005] };
+        camera.mount.angles_deg = [0.0, -80.0, 0.0];
+        camera.shutter = ShutterSpec { readout_ms: 10.0, exposure_ms: 10.0, ..ShutterSpec::default() };
+        let sequence = sequence(scenario, steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(2.0, 3.0, 6.0)), pattern(60_000.0));
+        let Found { plan, worst, .. } = find(&engine, &sequence);
+        let (measured_px, predicted) = (worst.smooth.p99_px, &plan.predicted);
+        eprintln!("{max_error_px}: {measured_px:.2e} px, predicted {:.2e}; {:?}", predicted.total_px, plan.blur);
+        assert!(predicted.kept && measured_px <= predicted.total_px, "{max_error_px}: {:?}", predicted.in_the_way);
     }
 }
 

@@ -190,7 +190,7 @@ impl Predicted {
         if probes == 0 {
             return writeln!(f, "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty");
         }
-        let verdict = if self.kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" };
+        let verdict = if self.kept { "within the tolerance" } else { "the tolerance is NOT KEPT" };
         writeln!(f, "  at most {total_px:.2e} in all, from dry runs of {probes} pixels: {verdict}")?;
         if let Some(cause) = &self.in_the_way {
             writeln!(f, "  in the way: {cause}")?;
@@ -221,7 +221,7 @@ impl Predicted {
         writeln!(
             f,
             "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{silhouettes}: {}",
-            if self.levels_kept { "within the tolerance" } else { "the tolerance CANNOT BE KEPT" }
+            if self.levels_kept { "within the tolerance" } else { "the tolerance is NOT KEPT" }
         )?;
         match &self.levels_in_the_way {
             Some(cause) => writeln!(f, "  in the way: {cause}"),

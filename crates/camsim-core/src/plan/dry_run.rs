@@ -4,8 +4,9 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{
-    TemporalStage,
+    PathStage, TemporalStage,
     contours::LINES,
+    exposure::miss_px,
     probes::Probe,
     surfaces::{Met, Surfaces},
 };
@@ -176,6 +177,30 @@ impl Trial<'_> {
     fn instant_s(&self, probe: &Probe, share: f64) -> f64 {
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]);
         mid_s + self.shutter.exposure_s() * (share - 0.5)
+    }
+
+    /// Source at a share of the exposure, 0 to 1, of what the probe's ray then meets, and its inverse depth in the line's camera.
+    pub fn true_source_px(&self, probe: &Probe, share: f64) -> (DVec2, f64) {
+        let pose = self.path.pose(self.instant_s(probe, share));
+        let met = self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
+        let inverse_depth = met.map_or(0.0, |met| 1.0 / met.depth_m);
+        let (rotation, shift) = pose.relative_to(self.key_pose);
+        (self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + inverse_depth * shift), inverse_depth)
+    }
+
+    /// How far polynomial `k` of the exposure's path is from where the probe looks; 0 where its ray passes a silhouette meanwhile.
+    pub fn miss_along_surfaces_px(&self, probe: &Probe, path: PathStage, stretches: u32, k: u32) -> f64 {
+        let mut along = Vec::new();
+        let px = miss_px(path, stretches, k, |share| {
+            let (at_px, inverse_depth) = self.true_source_px(probe, share);
+            along.push((share, inverse_depth));
+            at_px
+        });
+        let is_step = |pair: &[(f64, f64)]| match *pair {
+            [(from, a), (to, b)] => steps(a, b, |share| self.true_source_px(probe, from + (to - from) * share).1),
+            _ => false,
+        };
+        if along.windows(2).any(is_step) { 0.0 } else { px }
     }
 
     /// Source at a share of the exposure, 0 to 1, for a surface of the probe's depth.

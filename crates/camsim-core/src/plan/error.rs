@@ -19,7 +19,6 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::{
-    camera::CameraModel,
     pose::CameraPose,
     scenario::{Auto, Preset},
     scene::TerrainDetail,
@@ -48,6 +47,10 @@ const SHARE_STEP: usize = 5;
 const PHASES: [f64; 5] = [0.0, -0.5, 0.5, -0.309, 0.191];
 /// As many of them do for a mount at rest.
 const AT_REST: usize = 3;
+/// Phases at which one probe in [`BETWEEN_STEP`] tries what lies between the depths of the exposure's ends. Seen from mid-exposure the depths of a bent surface are missed
+/// by a parabola that is 0 at both ends, and the way from there is 0 in the middle: the product is largest here, at 0.5 / sqrt(3).
+const BETWEEN: [f64; 2] = [-0.289, 0.289];
+const BETWEEN_STEP: usize = 2;
 /// Probes whose exposure is looked at.
 const MISS_PROBES: usize = 32;
 /// Polynomials of the path looked at for each of them.
@@ -170,7 +173,7 @@ impl Way {
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
-pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, motion: &Motion) -> Choice<'a> {
+pub(super) fn choose<'a>(case: &Case<'a>, demanded: Option<TemporalStage>, motion: &Motion) -> Choice<'a> {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
@@ -196,7 +199,7 @@ pub(super) fn choose<'a>(case: &'a Case<'_>, demanded: Option<TemporalStage>, mo
     Choice { way, terrain_error_px, predicted, truths }
 }
 
-impl Case<'_> {
+impl<'a> Case<'a> {
     /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the depth beside where they look: not
     /// for silhouettes.
     fn ways(&self, motion: &Motion, may_skip_depth: bool) -> Vec<Way> {
@@ -226,13 +229,13 @@ impl Case<'_> {
     }
 
     /// The choice that the ideal pass will make.
-    fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'_>> {
+    fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'a>> {
         let terrain = self.sequence.scene.terrain.as_ref()?;
         Some(TerrainDetail::new(terrain, self.key_pose, self.ideal.tangents(), self.ideal.focal_px.max_element(), max_error_px))
     }
 
     /// With an exposure that shows, the probes take turns in trying its [`PHASES`].
-    fn truths(&self) -> Truths<'_> {
+    fn truths(&self) -> Truths<'a> {
         let trial = Trial {
             surfaces: self.surfaces,
             path: &self.sequence.path,
@@ -249,13 +252,13 @@ impl Case<'_> {
             Some(_) if self.sequence.path.highest_vibration_hz() > 0.0 => &PHASES[..],
             Some(_) => &PHASES[..AT_REST],
         };
-        Truths::new(self.reach, self.ray, trial, phases)
+        Truths::new(self.reach, self.ray, trial, phases, 1)
     }
 }
 
 /// Where the probes of one frame look.
 pub(super) struct Truths<'a> {
-    camera: &'a CameraModel,
+    reach: &'a LensReach,
     ray: RayStage,
     trial: Trial<'a>,
     looked: Vec<Looked>,
@@ -276,15 +279,16 @@ impl Looked {
 }
 
 impl<'a> Truths<'a> {
-    fn new(reach: &'a LensReach, ray: RayStage, trial: Trial<'a>, phases: &[f64]) -> Self {
+    /// Of one probe in `step`.
+    fn new(reach: &'a LensReach, ray: RayStage, trial: Trial<'a>, phases: &[f64], step: usize) -> Self {
         let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
-        let looked = reach.probes.par_iter().enumerate().with_min_len(16).filter_map(look).collect();
-        Truths { camera: &reach.camera, ray, trial, looked }
+        let looked = reach.probes.par_iter().step_by(step).enumerate().with_min_len(16).filter_map(look).collect();
+        Truths { reach, ray, trial, looked }
     }
 
     /// At mid-exposure alone: for what silhouettes there are.
     pub fn of_silhouettes(reach: &'a LensReach, trial: Trial<'a>) -> Self {
-        Self::new(reach, RayStage::Pinhole, trial, &PHASES[..1])
+        Self::new(reach, RayStage::Pinhole, trial, &PHASES[..1], 1)
     }
 
     /// Largest displacement of a source by the level of detail.
@@ -315,8 +319,16 @@ impl<'a> Truths<'a> {
     /// What `keys` do not see.
     pub fn holes(&self, keys: &[KeyFrame], max_error_px: f64) -> Holes {
         let looked = self.looked.par_iter().map(|Looked { probe, truth, .. }| (probe, truth));
-        let ideal_from_camera = self.trial.ideal.focal_px.x / self.camera.focal_px.x;
-        Holes::new(&self.trial, looked, keys, ideal_from_camera * spacing_px(self.camera), max_error_px)
+        let camera = &self.reach.camera;
+        let ideal_from_camera = self.trial.ideal.focal_px.x / camera.focal_px.x;
+        Holes::new(&self.trial, looked, keys, ideal_from_camera * spacing_px(camera), max_error_px)
+    }
+
+    /// Largest miss of what lies between the depths of the exposure's ends.
+    fn between_ends_px(&self) -> f64 {
+        let of = |looked: &Looked| self.trial.between_ends_px(&looked.probe, &looked.truth);
+        let px: Vec<f64> = self.looked.par_iter().with_min_len(16).map(of).collect();
+        self.largest(|i, _| px[i])
     }
 
     fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
@@ -354,18 +366,18 @@ impl Forecast<'_> {
             return 0.0;
         }
         *self.between_px.get_or_init(|| {
-            let of = |looked: &Looked| self.truths.trial.between_ends_px(&looked.probe, &looked.truth);
-            let px: Vec<f64> = self.truths.looked.par_iter().with_min_len(16).map(of).collect();
-            self.truths.largest(|i, _| px[i])
+            let Truths { reach, ray, trial, .. } = *self.truths;
+            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP);
+            self.truths.between_ends_px().max(between.between_ends_px())
         })
     }
 
     /// The first way within the tolerance, or the best there is.
     pub fn choose(&self, tolerance_px: f64, ways: Vec<Way>) -> Way {
         let mut best: Option<(f64, Way)> = None;
-        let mut known_nodes: Vec<([u32; 2], f64)> = Vec::new();
+        let mut known_nodes: Vec<((u32, u32, bool), f64)> = Vec::new();
         for way in ways {
-            let nodes = way.blur.map_or([0; 2], |blur| [blur.solved(), blur.path.steps()]);
+            let nodes = way.blur.map_or_else(Default::default, |blur| (blur.solved(), blur.path.steps(), blur.depths == NodeDepths::Each));
             let nodes_px = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
                 let px = self.nodes_px(way.blur);
                 known_nodes.push((nodes, px));
@@ -407,7 +419,7 @@ impl Forecast<'_> {
             (lens_px, "the lens inverse"),
             (format_px, "single precision of poses and coordinates"),
             (temporal_px, "the temporal inverse"),
-            (depth_px, "depth between the pixels of the ideal frame"),
+            (depth_px, "depth between the pixels of the ideal frame (quality.key_frames or quality.ideal_scale may do more)"),
             (nodes_px, nodes.as_str()),
         ];
         let largest = || causes.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)).map(|(px, what)| format!("{what}: {px:.2e} px"));
@@ -440,22 +452,25 @@ impl Forecast<'_> {
     }
 
     fn rounding(&self, Looked { probe, truth, .. }: &Looked, run: &Outcome, stage: TemporalStage) -> Rounding {
-        let Truths { camera, ray, trial, .. } = self.truths;
-        Rounding::new(probe, truth.at_px, run.parallax_px, camera, trial.ideal, *ray, stage)
+        let Truths { reach, ray, trial, .. } = self.truths;
+        Rounding::new(probe, truth.at_px, run.parallax_px, &reach.camera, trial.ideal, *ray, stage)
     }
 
-    /// Largest miss of the curves between the exposure's nodes.
+    /// Largest miss of the curves between the exposure's nodes: for a surface at one depth, and where each node finds its own, along what the rays meet.
     fn nodes_px(&self, blur: Option<BlurStage>) -> f64 {
         let Some(blur) = blur else { return 0.0 };
         let Truths { trial, looked, .. } = self.truths;
         let stretches = blur.stretches();
         let looked_at = MISSED_STRETCHES.min(stretches);
         let every = looked.len().div_ceil(MISS_PROBES).max(1);
-        let miss = |Looked { probe, truth, .. }: &Looked| {
+        let miss = |(i, Looked { probe, truth, .. }): (usize, &Looked)| {
             let of_stretch = |k| miss_px(blur.path, stretches, k, |share| trial.source_px(probe, truth, share));
-            (0..looked_at).map(|k| of_stretch(k * stretches / looked_at)).fold(0.0, f64::max)
+            let at_one_depth = (0..looked_at).map(|k| of_stretch(k * stretches / looked_at)).fold(0.0, f64::max);
+            let follows = blur.depths == NodeDepths::Each;
+            let along_surfaces = follows.then(|| trial.miss_along_surfaces_px(probe, blur.path, stretches, i as u32 % stretches));
+            along_surfaces.map_or(at_one_depth, |px| px.max(at_one_depth))
         };
-        SAFETY * looked.iter().step_by(every).map(miss).fold(0.0, f64::max)
+        SAFETY * looked.iter().step_by(every).enumerate().map(miss).fold(0.0, f64::max)
     }
 }
 

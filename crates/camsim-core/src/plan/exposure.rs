@@ -41,6 +41,20 @@ impl ExposurePath {
     /// From end to end.
     pub const STRAIGHT: Self = Self { path: PathStage::Straight, stretches: 1, stride: 1 };
 
+    /// With more nodes; `None` where the path is missed by no more than its share of the tolerance, and where there are as many as there may be.
+    pub fn finer(self, miss_px: f64, max_error_px: f64) -> Option<Self> {
+        let path = PathStage::Quartic;
+        let (allowed_px, steps) = (SHARE * max_error_px, path.steps());
+        let stretches = match self.path {
+            PathStage::Quartic => {
+                (f64::from(self.stretches) * more_for(miss_px, allowed_px, steps)).ceil().min(f64::from(MOST_STEPS / steps)) as u32
+            }
+            PathStage::Straight | PathStage::Parabola => self.stretches,
+        };
+        let finer = Self { path, stretches, stride: 1 };
+        (miss_px > allowed_px && finer != Self { stride: 1, ..self }).then_some(finer)
+    }
+
     pub fn with_samples(self, samples_per_px: f64, max_samples: u32) -> BlurStage {
         let Self { path, stretches, stride } = self;
         let nodes = stretches * path.steps() * stride + 1;
@@ -109,7 +123,7 @@ impl Exposed<'_> {
             if miss_px <= allowed_px || stretches >= most {
                 break;
             }
-            stretches = (stretches * (1.05 * miss_px / allowed_px).powf((steps + 1.0).recip())).ceil().clamp(stretches + 1.0, most);
+            stretches = (stretches * more_for(miss_px, allowed_px, path.steps())).ceil().clamp(stretches + 1.0, most);
         }
         stretches as u32
     }
@@ -142,11 +156,16 @@ impl Exposed<'_> {
     }
 }
 
+/// How many times more polynomials a path takes that is missed by more than is allowed.
+fn more_for(miss_px: f64, allowed_px: f64, steps: u32) -> f64 {
+    (1.05 * miss_px / allowed_px).powf(f64::from(steps + 1).recip())
+}
+
 /// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a share of the exposure (0 to 1).
-pub(super) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl Fn(f64) -> DVec2) -> f64 {
+pub(super) fn miss_px(path: PathStage, stretches: u32, k: u32, place: impl FnMut(f64) -> DVec2) -> f64 {
     let halves = 2 * path.steps();
-    let places: Vec<DVec2> =
-        (0..=halves).map(|half| place((f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches))).collect();
+    let share = |half: u32| (f64::from(k) + f64::from(half) / f64::from(halves)) / f64::from(stretches);
+    let places: Vec<DVec2> = (0..=halves).map(share).map(place).collect();
     let miss_px = miss_of(&places);
     if miss_px.is_finite() { miss_px } else { 0.0 }
 }
@@ -163,6 +182,19 @@ fn miss_of(places: &[DVec2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_missed_path_gets_more_nodes_as_long_as_there_are_more() {
+        let finer = |exposure: ExposurePath, miss_px: f64| exposure.finer(miss_px, 0.05);
+        assert_eq!(finer(ExposurePath::STRAIGHT, 0.5 * SHARE * 0.05), None);
+        let quartic = ExposurePath { path: PathStage::Quartic, stretches: 1, stride: 1 };
+        assert_eq!(finer(ExposurePath::STRAIGHT, 1.0), Some(quartic));
+        assert_eq!(finer(ExposurePath { path: PathStage::Parabola, ..quartic }, 1.0), Some(quartic));
+        // 0.8 px are 32 times what is allowed, and the miss falls with the fifth power of the stretches: 2 would do, but for a margin.
+        assert_eq!(finer(quartic, 32.0 * SHARE * 0.05), Some(ExposurePath { stretches: 3, ..quartic }));
+        let most = ExposurePath { stretches: MOST_STEPS / 4, ..quartic };
+        assert_eq!((finer(quartic, 1e12), finer(most, 1e12)), (Some(most), None));
+    }
 
     #[test]
     fn the_largest_miss_is_found() {

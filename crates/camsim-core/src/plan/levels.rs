@@ -284,7 +284,10 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: E
         (true, ..) => format!("samples over the exposure: {blur_dn:.2}/255"),
         (false, _, Auto::Value(_), _) => format!("quality.footprint_taps: {resampling_dn:.2}/255"),
         (false, _, _, Auto::Value(_)) => format!("quality.ideal_scale: {resampling_dn:.2}/255"),
-        _ => format!("detail finer than an ideal frame of {:.2} times the camera's scale holds: {resampling_dn:.2}/255", sampling.scale),
+        _ => format!(
+            "detail finer than an ideal frame of {:.2} times the camera's scale holds (quality.ideal_scale may be more): {resampling_dn:.2}/255",
+            sampling.scale
+        ),
     })
 }
 

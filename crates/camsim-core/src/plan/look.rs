@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges, error, exposure,
-    forced, motion, paper, prospect, sharing, zoom_at,
+    BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges,
+    error, exposure, forced, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -95,6 +95,21 @@ impl<'a> Look<'a> {
     pub fn exposed(&self, motion: Motion, ideal: &IdealGeometry) -> exposure::Exposed<'_> {
         let (path, shutter) = (self.path(), &self.planner.shutter);
         exposure::Exposed { reach: &self.reach, path, shutter, stamp_s: self.stamp_s, focal_px: ideal.focal_px, motion }
+    }
+
+    /// The exposure with its samples, and with the poses that rays at silhouettes take.
+    pub fn blur_stage(
+        &self,
+        exposure: exposure::ExposurePath,
+        edges: EdgeStage,
+        sampling: &Sampling,
+        motion: Motion,
+        ideal: &IdealGeometry,
+    ) -> BlurStage {
+        let quality = &self.planner.sequence.scenario.quality;
+        let has_rays = edges.has_rays() && self.demanded != Some(TemporalStage::Linear);
+        let exposure = if has_rays { self.exposed(motion, ideal).with_poses_for_rays(exposure, quality) } else { exposure };
+        sampling.blur_stage(exposure, quality, motion.blur_px)
     }
 
     pub fn scenery(&self) -> Scenery<'a> {
