@@ -277,11 +277,11 @@ fn a_path_that_is_missed_gets_more_nodes() {
         scenario.quality.max_error_px = max_error_px;
         let camera = &mut scenario.camera;
         camera.size_px = [160, 120];
-        camera.focal_px = [60.0, 60.0];
-        camera.lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.02, 0.01, -0.005, 0.0005] };
-        camera.mount.angles_deg = [0.0, -80.0, 0.0];
-        camera.shutter = ShutterSpec { readout_ms: 10.0, exposure_ms: 10.0, ..ShutterSpec::default() };
-        let sequence = sequence(scenario, steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(2.0, 3.0, 6.0)), pattern(60_000.0));
+        camera.focal_px = [69.67, 69.62];
+        camera.lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.013_721_8, 0.020_727_4, -0.012_786_5, 0.002_524_2] };
+        camera.mount.angles_deg = [0.0, -60.0, 0.0];
+        camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() };
+        let sequence = sequence(scenario, steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(1.0, 3.0, 1.0)), pattern(60_000.0));
         let Found { plan, worst, .. } = find(&engine, &sequence);
         let (measured_px, predicted) = (worst.smooth.p99_px, &plan.predicted);
         eprintln!("{max_error_px}: {measured_px:.2e} px, predicted {:.2e}; {:?}", predicted.total_px, plan.blur);
