@@ -38,6 +38,7 @@ pub mod paper;
 mod picture;
 mod probes;
 mod prospect;
+mod resample;
 mod rounding;
 mod sharing;
 mod sight;
@@ -335,6 +336,7 @@ impl Planner {
             key_pose: &key_pose,
             ideal: &tried,
             key_twist,
+            demanded,
             ray,
             blur,
             straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
@@ -345,13 +347,13 @@ impl Planner {
             constant_twist: look.common.is_none(),
             surfaces: &self.surfaces,
         };
-        let mut choice = error::choose(&case, demanded, &motion);
+        let mut choice = error::choose(&case, &motion);
         for _ in 0..MOST_REFINEMENTS {
             let missed = Some(choice.predicted.nodes_px).filter(|_| !choice.predicted.kept && demanded != Some(TemporalStage::Linear));
             let Some(finer) = exposure.zip(missed).and_then(|(exposure, px)| exposure.finer(px, quality.max_error_px)) else { break };
             exposure = Some(finer);
             case.blur = Some(look.blur_stage(finer, edges, &sampling, motion, &tried));
-            choice = error::choose(&case, demanded, &motion);
+            choice = error::choose(&case, &motion);
         }
         let error::Choice { way, terrain_error_px, mut predicted, truths } = choice;
         let error::Way { temporal, blur } = way;

@@ -278,7 +278,8 @@ fn a_path_that_is_missed_gets_more_nodes() {
         let camera = &mut scenario.camera;
         camera.size_px = [160, 120];
         camera.focal_px = [69.67, 69.62];
-        camera.lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.013_721_8, 0.020_727_4, -0.012_786_5, 0.002_524_2] };
+        camera.lens =
+            LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![-0.013_721_8, 0.020_727_4, -0.012_786_5, 0.002_524_2] };
         camera.mount.angles_deg = [0.0, -60.0, 0.0];
         camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 10.0, ..ShutterSpec::default() };
         let sequence = sequence(scenario, steady(400.0, 0.0, DVec3::new(20.0, 5.0, 0.0), DVec3::new(1.0, 3.0, 1.0)), pattern(60_000.0));

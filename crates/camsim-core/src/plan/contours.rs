@@ -17,7 +17,7 @@ use crate::{
     mount::CameraPath,
     pose::CameraPose,
     shutter::Shutter,
-    silhouette::{NEAR_PX, may_step, steps},
+    silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
 };
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
@@ -62,9 +62,13 @@ pub(super) struct Search<'a> {
     pub key_pose: &'a CameraPose,
     /// Of the linear range for a pixel, for each unit of light that arrives.
     pub gain: &'a (dyn Fn([u32; 2]) -> f64 + Sync),
-    /// What the ideal frame's camera does not see, and the share of the pixels at silhouettes as it is told by rays around some of the probes.
-    pub holes: Holes,
-    pub least_share: f64,
+}
+
+/// What is seen around a probe.
+pub(super) struct Around {
+    contour: Option<Contour>,
+    /// Whether there is a step or a fold of depth.
+    pub is_beside: bool,
 }
 
 /// The same for ideal frames of any scale.
@@ -104,6 +108,22 @@ impl Contour {
 }
 
 impl Outlook {
+    /// From what is seen around all probes, what the ideal frame's camera does not see, and the least share that pixels at silhouettes have.
+    pub fn new(around: &[Around], holes: Holes, least_share: f64) -> Self {
+        let found = || around.iter().filter_map(|around| around.contour.as_ref());
+        let near = found().count();
+        let mean = |of: &dyn Fn(&Contour) -> f64| found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
+        let share = near as f64 / around.len().max(1) as f64;
+        let contrast2 = mean(&|contour| contour.contrast2);
+        let stairs = share * mean(&Contour::stairs);
+        Self {
+            share: share.max(least_share),
+            contrast_dn: 255.0 * contrast2.sqrt(),
+            hidden_share: holes.share,
+            squares: [stairs, STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip)],
+        }
+    }
+
     /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel, with so many ideal pixels for each of the
     /// camera's and fine pixels for each of them, along a side.
     pub fn price_of_rays(&self, scale: f64, fine: u32) -> f64 {
@@ -137,24 +157,13 @@ impl Contours {
 }
 
 impl Search<'_> {
-    pub fn outlook(&self) -> Outlook {
-        let probes = &self.reach.probes;
-        let found: Vec<Option<Contour>> = probes.par_iter().with_min_len(16).map(|probe| self.look(probe)).collect();
-        let near = found.iter().flatten().count();
-        let mean = |of: &dyn Fn(&Contour) -> f64| found.iter().flatten().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
-        let share = near as f64 / probes.len().max(1) as f64;
-        let contrast2 = mean(&|contour| contour.contrast2);
-        let stairs = share * mean(&Contour::stairs);
-        Outlook {
-            share: share.max(self.least_share),
-            contrast_dn: 255.0 * contrast2.sqrt(),
-            hidden_share: self.holes.share,
-            squares: [stairs, STRIPS * contrast2 * self.holes.narrow_share + share * mean(&Contour::strip)],
-        }
+    /// Around each of the camera's probes.
+    pub fn look_around(&self) -> Vec<Around> {
+        self.reach.probes.par_iter().with_min_len(16).map(|probe| self.look(probe)).collect()
     }
 
     /// At the probe's own instant, along rows, columns and diagonals of three by three places.
-    fn look(&self, probe: &Probe) -> Option<Contour> {
+    fn look(&self, probe: &Probe) -> Around {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
@@ -185,11 +194,14 @@ impl Search<'_> {
         let strip_px = |&[a, b]: &[usize; 2]| (key_px(inverse_depth[a]) - key_px(inverse_depth[b])).dot(normal).abs();
         let color = |i: usize| self.surfaces.color(met[i].as_ref(), uv(places[i]).extend(1.0).length());
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
-        (!across.is_empty()).then(|| Contour {
+        // Between places 3 px apart a crease bends threefold.
+        let is_fold = |line: &[usize; 3]| bends(line.map(|i| inverse_depth[i]), f64::from(NEAR_PX) * FOLD);
+        let contour = (!across.is_empty()).then(|| Contour {
             strip_px: across.iter().map(strip_px).fold(0.0, f64::max),
             contrast2: (self.gain)(probe.pixel).powi(2) * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], self.reach.camera.focal_px).1,
-        })
+        });
+        Around { is_beside: contour.is_some() || LINES.iter().any(is_fold), contour }
     }
 }
 
@@ -235,18 +247,9 @@ mod tests {
         let reach = LensReach::new(Arc::new(camera)).unwrap();
         let (key_pose, gain) = (path.pose(0.0), |_: [u32; 2]| gain);
         let surfaces = Surfaces::new(Arc::new(scene));
-        Search {
-            reach: &reach,
-            surfaces: &surfaces,
-            path: &path,
-            shutter: &shutter,
-            stamp_s: 0.0,
-            key_pose: &key_pose,
-            gain: &gain,
-            holes,
-            least_share: 0.0,
-        }
-        .outlook()
+        let search =
+            Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, key_pose: &key_pose, gain: &gain };
+        Outlook::new(&search.look_around(), holes, 0.0)
     }
 
     #[test]

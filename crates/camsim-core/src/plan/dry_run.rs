@@ -34,8 +34,8 @@ pub(super) struct Trial<'a> {
     pub key_s: f64,
     pub key_pose: &'a CameraPose,
     pub ideal: &'a IdealGeometry,
-    /// Motion of the camera at the key instant, for the paper's models.
-    pub twist: Twist,
+    /// Motion of the camera at the key instant, for the paper's models; `None` where nobody asks for them.
+    pub twist: Option<Twist>,
     /// Whether these read the nearest texel's depth.
     pub nearest_depth: bool,
 }
@@ -130,14 +130,16 @@ impl Trial<'_> {
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
         outcome.of_mid = self.with_depth_of_mid(probe, truth, &mut depth).map_or(outcome.after, |places| places.map(off));
-        let dt_s = truth.t_s - self.key_s;
-        let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
-        let displaced = |stage: TemporalStage| {
-            let uv = stage.displaced(probe.uv, w, &self.twist, dt_s).unwrap_or(DVec2::NAN);
-            off(self.ideal.px_from_point(uv.extend(1.0)))
-        };
-        outcome.linear_px = displaced(TemporalStage::Linear);
-        outcome.rk2_px = displaced(TemporalStage::Rk2);
+        if let Some(twist) = &self.twist {
+            let dt_s = truth.t_s - self.key_s;
+            let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
+            let displaced = |stage: TemporalStage| {
+                let uv = stage.displaced(probe.uv, w, twist, dt_s).unwrap_or(DVec2::NAN);
+                off(self.ideal.px_from_point(uv.extend(1.0)))
+            };
+            outcome.linear_px = displaced(TemporalStage::Linear);
+            outcome.rk2_px = displaced(TemporalStage::Rk2);
+        }
         outcome
     }
 
@@ -256,7 +258,7 @@ impl Trial<'_> {
 }
 
 impl Truth {
-    fn is_hidden(&self) -> bool {
+    pub fn is_hidden(&self) -> bool {
         self.seen.is_some_and(|seen| self.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
     }
 }

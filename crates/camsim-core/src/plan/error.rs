@@ -120,6 +120,8 @@ pub(super) struct Case<'a> {
     pub key_pose: &'a CameraPose,
     pub ideal: &'a IdealGeometry,
     pub key_twist: Twist,
+    /// The solver that the scenario asks for.
+    pub demanded: Option<TemporalStage>,
     pub ray: RayStage,
     pub blur: Option<BlurStage>,
     /// The same for a path that is a straight line in time.
@@ -173,7 +175,7 @@ impl Way {
 }
 
 /// The cheapest temporal inverse, and the coarsest terrain, within the tolerance.
-pub(super) fn choose<'a>(case: &Case<'a>, demanded: Option<TemporalStage>, motion: &Motion) -> Choice<'a> {
+pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
@@ -188,7 +190,7 @@ pub(super) fn choose<'a>(case: &Case<'a>, demanded: Option<TemporalStage>, motio
     let forecast = truths.forecast(detail.as_ref());
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = !case.silhouettes_in_view || motion.parallax_px <= BOUND_SHARE * tolerance_px;
-    let way = match demanded {
+    let way = match case.demanded {
         Some(temporal) => Way { temporal, blur: case.blur },
         None => forecast.choose(tolerance_px, case.ways(motion, may_skip_depth)),
     };
@@ -203,13 +205,12 @@ impl<'a> Case<'a> {
     /// Ways in the order of their time, as measured by `camsim bench`. The constant-twist solvers read the depth beside where they look: not
     /// for silhouettes.
     fn ways(&self, motion: &Motion, may_skip_depth: bool) -> Vec<Way> {
-        let quality = &self.sequence.scenario.quality;
         let with = |temporal| Way { temporal, blur: self.blur };
         let mut ways = Vec::new();
         if may_skip_depth {
             ways.extend([TemporalStage::Identity, TemporalStage::Rotation].map(with));
         }
-        if self.constant_twist && quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view {
+        if self.may_take_twist() {
             ways.push(Way { temporal: TemporalStage::Linear, blur: self.straight_blur });
             if motion.rotation_rad < CHEAP_RK2_STEPS * RK2_STEP_DEG.to_radians() {
                 ways.push(with(TemporalStage::Rk2));
@@ -228,6 +229,17 @@ impl<'a> Case<'a> {
         ways
     }
 
+    /// Whether the solvers of constant twist are tried.
+    fn may_take_twist(&self) -> bool {
+        let quality = &self.sequence.scenario.quality;
+        self.constant_twist && quality.solver == Auto::Auto && quality.key_frames == Auto::Auto && !self.silhouettes_in_view
+    }
+
+    /// Whether anybody wants to know what these solvers do.
+    fn asks_for_twist(&self) -> bool {
+        matches!(self.demanded, Some(TemporalStage::Linear | TemporalStage::Rk2)) || self.demanded.is_none() && self.may_take_twist()
+    }
+
     /// The choice that the ideal pass will make.
     fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'a>> {
         let terrain = self.sequence.scene.terrain.as_ref()?;
@@ -244,7 +256,7 @@ impl<'a> Case<'a> {
             key_s: self.key_s,
             key_pose: self.key_pose,
             ideal: self.ideal,
-            twist: self.key_twist,
+            twist: self.asks_for_twist().then_some(self.key_twist),
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
         };
         let phases = match self.blur {
@@ -266,6 +278,8 @@ pub(super) struct Truths<'a> {
 
 /// One probe.
 struct Looked {
+    /// Of the camera's probes.
+    number: usize,
     probe: Probe,
     truth: Truth,
     /// Whether it is to be counted apart; unknown until it matters.
@@ -273,15 +287,16 @@ struct Looked {
 }
 
 impl Looked {
-    fn new(probe: Probe, truth: Truth) -> Self {
-        Self { probe, truth, apart: OnceLock::new() }
+    fn new(number: usize, probe: Probe, truth: Truth) -> Self {
+        Self { number, probe, truth, apart: OnceLock::new() }
     }
 }
 
 impl<'a> Truths<'a> {
     /// Of one probe in `step`.
     fn new(reach: &'a LensReach, ray: RayStage, trial: Trial<'a>, phases: &[f64], step: usize) -> Self {
-        let look = |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(*probe, truth));
+        let look =
+            |(i, probe): (usize, &Probe)| trial.look(probe, phases[i % phases.len()]).map(|truth| Looked::new(i * step, *probe, truth));
         let looked = reach.probes.par_iter().step_by(step).enumerate().with_min_len(16).filter_map(look).collect();
         Truths { reach, ray, trial, looked }
     }
@@ -314,6 +329,12 @@ impl<'a> Truths<'a> {
         let asked: Vec<&Looked> = self.looked.iter().step_by(SHARE_STEP).collect();
         let apart = asked.par_iter().with_min_len(8).filter(|looked| self.trial.at_silhouette(&looked.probe, &looked.truth, true)).count();
         apart as f64 / asked.len().max(1) as f64
+    }
+
+    /// The same of all of them, given which probes are beside a step or fold.
+    pub fn share_apart(&self, is_beside: impl Fn(usize) -> bool) -> f64 {
+        let apart = self.looked.iter().filter(|looked| looked.truth.is_hidden() || is_beside(looked.number)).count();
+        apart as f64 / self.looked.len().max(1) as f64
     }
 
     /// What `keys` do not see.

@@ -14,7 +14,6 @@ use super::{
     exposure::ExposurePath,
     picture::Picture,
     prospect::{Prospect, Sight},
-    transfer::{Path, SurfaceFilter, error2},
 };
 use crate::{
     scenario::{Auto, Preset, QualitySpec},
@@ -119,11 +118,8 @@ impl Prospect<'_> {
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let filter = SurfaceFilter::new(sight.texel_from_key * scale.recip(), surface_reads);
-            let samples = blur.map(|blur| sample_count(&blur, scale * sight.path_px, &area));
-            let beside_px = (scale * sight.key_px + self.principal_px).fract_gl();
-            let path = samples.map(|samples| Path { along: scale * sight.path, samples: sight.apart(samples) });
-            let error = error2(sight.spectrum, &filter, sight.key_from_camera * sides, &area, path, beside_px);
+            let samples = blur.map(|blur| sight.apart(sample_count(&blur, scale * sight.path_px, &area)));
+            let error = sight.error2(scale, surface_reads, taps, samples, self.principal_px);
             let weight = sight.weight * sight.gain * sight.gain;
             [sight.weight, weight * error[0], weight * error[1]]
         };

@@ -138,13 +138,14 @@ impl<'a> Look<'a> {
         if !in_view || self.is_paper() || ignored {
             return None;
         }
-        let &Self { stamp_s, key_s, ref key_pose, ref reach, key_twist, .. } = self;
+        let &Self { stamp_s, key_s, ref key_pose, ref reach, .. } = self;
         let path = self.path();
-        let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: key_twist, nearest_depth: false };
+        let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: None, nearest_depth: false };
         let truths = error::Truths::of_silhouettes(reach, trial);
-        let (holes, least_share) = (truths.holes(&[self.key()], quality.max_error_px), truths.silhouette_share());
         let gain = &prospect::gain(sequence, &reach.camera);
-        Some(contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain, holes, least_share }.outlook())
+        let around = contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain }.look_around();
+        let least_share = truths.share_apart(|probe| around[probe].is_beside);
+        Some(contours::Outlook::new(&around, truths.holes(&[self.key()], quality.max_error_px), least_share))
     }
 }
 

@@ -8,6 +8,7 @@ use super::{
     LensReach,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
+    resample::Parts,
     surfaces::{FOG_AT_VISIBILITY, Met, Surfaces},
     transfer::sinc,
 };
@@ -33,6 +34,8 @@ pub(super) struct Sight<'a> {
     pub key_px: DVec2,
     pub path: DVec2,
     pub path_px: f64,
+    /// What has been found out about ways of resampling it.
+    pub parts: Parts,
 }
 
 /// The places of a frame.
@@ -84,6 +87,7 @@ impl<'a> Prospect<'a> {
                 texel_from_key: shown.texel_from_camera * shown.key_from_camera.inverse(),
                 path: shown.key_from_camera * path.0,
                 path_px: path.1,
+                parts: Parts::default(),
             })
         };
         let seen: Vec<Seen<'_>> = probes.par_iter().step_by(PROBE_STEP).map(sight).collect();

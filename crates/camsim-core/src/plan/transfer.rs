@@ -113,9 +113,6 @@ impl Version {
 
 /// The filter of the ideal frame's surfaces. Twin of `picture_at` in shaders/ideal/reads.
 pub(crate) struct SurfaceFilter {
-    /// d(texel)/d(ideal px), and what takes a frequency from cycles an ideal pixel to cycles a texel.
-    texel_from_ideal: DMat2,
-    texel_cycles: DMat2,
     /// Sides of the grid of reads, texels, and its reads.
     sides: [DVec2; 2],
     taps: [u32; 2],
@@ -148,8 +145,6 @@ impl SurfaceFilter {
         };
         let length = |side: f64, taps: f64| ((side * side - variance).max(0.0) / (1.0 - (taps * taps).recip()).max(0.5)).sqrt();
         Self {
-            texel_from_ideal,
-            texel_cycles: texel_from_ideal.inverse().transpose(),
             sides: [along * length(longer, long_taps), along.perp() * length(shorter, short_taps)],
             taps: [long_taps as u32, short_taps as u32],
             level,
@@ -187,7 +182,7 @@ pub(super) struct Path {
 }
 
 /// A complex number: what is left of a wave, and how far it is shifted.
-type Wave = DVec2;
+pub(super) type Wave = DVec2;
 
 /// The samples of an exposure, each at its place on the path and at one of the taps in turn. Those of one tap stand evenly on the path: their
 /// sum is a geometric one.
@@ -228,56 +223,80 @@ fn aliases(softness: Option<f64>, f: f64, beside_px: f64) -> [Alias; 3] {
     })
 }
 
-/// Expected squared error of a pixel with the sides `sides` (ideal px), of the linear range: with the mean over the path exact, and with its
-/// samples. `beside_px` is where its source lies between ideal pixels.
-pub(super) fn error2(
-    spectrum: &Spectrum,
-    filter: &SurfaceFilter,
-    sides: DMat2,
-    area: &Footprint,
-    path: Option<Path>,
-    beside_px: DVec2,
-) -> [f64; 2] {
-    let per_texel = filter.texel_from_ideal.determinant().abs().recip();
-    let soft = |k: usize| area.spline.map(|softness| softness[k]);
-    let mut sums = [0.0; 2];
-    for i in 0..OCTAVES * AN_OCTAVE {
-        let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
-        // Of a half-plane: the other half is its mirror image.
-        let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
-        for j in 0..DIRECTIONS {
+/// Waves of a texture that a pixel sees.
+#[derive(Debug)]
+pub(super) struct Waves(Vec<Seen>);
+
+#[derive(Debug)]
+struct Seen {
+    /// Cycles an ideal pixel, and cycles a texel.
+    f: DVec2,
+    cycles: DVec2,
+    power: f64,
+    /// What the exact mean leaves.
+    exact: f64,
+}
+
+impl Waves {
+    /// `sides`: of the pixel, ideal px; `along`: the path over the exposure, if that shows.
+    pub fn new(spectrum: &Spectrum, texel_from_ideal: DMat2, sides: DMat2, along: Option<DVec2>) -> Self {
+        let per_texel = texel_from_ideal.determinant().abs().recip();
+        let texel_cycles = texel_from_ideal.inverse().transpose();
+        let wave = |(i, j): (u32, u32)| {
+            let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
+            // Of a half-plane: the other half is its mirror image.
+            let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
             let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
-            let cycles = filter.texel_cycles * f;
+            let cycles = texel_cycles * f;
             if cycles.abs().max_element() > MOST_CYCLES {
-                continue;
+                return None;
             }
             let power = weight * per_texel * spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
-            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
-            let ideal = filter.leaves(cycles);
-            // The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
-            let [mut smooth, mut in_samples] = [Wave::ZERO; 2];
-            let [x, y] = [0, 1].map(|k| aliases(soft(k), f[k], beside_px[k]));
-            for (x, y) in x.iter().flat_map(|x| y.iter().map(move |y| (x, y))) {
-                let turned = ideal * x.read.rotate(y.read);
-                if turned.length_squared() < UNSEEN * UNSEEN {
-                    continue;
-                }
-                let seen = DVec2::new(x.seen, y.seen);
-                let over_area = turned * grid(area, seen);
-                match path {
-                    None => smooth += over_area,
-                    Some(path) => {
-                        smooth += over_area * sinc(path.along.dot(seen));
-                        in_samples += turned.rotate(sampled(area, path, seen));
-                    }
-                }
+            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * along.map_or(1.0, |along| sinc(along.dot(f)));
+            Some(Seen { f, cycles, power, exact })
+        };
+        Self((0..OCTAVES * AN_OCTAVE).flat_map(|i| (0..DIRECTIONS).map(move |j| (i, j))).filter_map(wave).collect())
+    }
+
+    /// What the filter of the surfaces leaves of each.
+    pub fn filtered(&self, filter: &SurfaceFilter) -> Vec<f64> {
+        self.0.iter().map(|wave| filter.leaves(wave.cycles)).collect()
+    }
+
+    /// What reading the ideal frame leaves of each, with the mean over the path exact, and with its samples. `beside_px` is where the source lies between
+    /// ideal pixels.
+    pub fn read(&self, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> Vec<[Wave; 2]> {
+        self.0.iter().map(|wave| read_wave(wave.f, area, path, beside_px)).collect()
+    }
+}
+
+/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
+fn read_wave(f: DVec2, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> [Wave; 2] {
+    let [mut smooth, mut in_samples] = [Wave::ZERO; 2];
+    let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
+    for (x, y) in x.iter().flat_map(|x| y.iter().map(move |y| (x, y))) {
+        let turned = x.read.rotate(y.read);
+        if turned.length_squared() < UNSEEN * UNSEEN {
+            continue;
+        }
+        let seen = DVec2::new(x.seen, y.seen);
+        let over_area = turned * grid(area, seen);
+        match path {
+            None => smooth += over_area,
+            Some(path) => {
+                smooth += over_area * sinc(path.along.dot(seen));
+                in_samples += turned.rotate(sampled(area, path, seen));
             }
-            let error = |found: Wave| power * (found - Wave::new(exact, 0.0)).length_squared();
-            sums[0] += error(smooth);
-            sums[1] += error(if path.is_some() { in_samples } else { smooth });
         }
     }
-    sums
+    [smooth, if path.is_some() { in_samples } else { smooth }]
+}
+
+/// Expected squared error of a pixel, of the linear range: with the mean over the path exact, and with its samples.
+pub(super) fn error2(waves: &Waves, filtered: &[f64], read: &[[Wave; 2]]) -> [f64; 2] {
+    let parts = waves.0.iter().zip(filtered).zip(read);
+    let error = |wave: &Seen, found: Wave| wave.power * (found - Wave::new(wave.exact, 0.0)).length_squared();
+    parts.fold([0.0; 2], |sums, ((wave, &ideal), read)| [0, 1].map(|k: usize| sums[k] + error(wave, ideal * read[k])))
 }
 
 #[cfg(test)]
@@ -405,7 +424,8 @@ mod tests {
         let filter = SurfaceFilter::new(DMat2::IDENTITY, SurfaceReads::Grid);
         let error = |stage, beside_px| {
             let area = Footprint::new(DVec2::X, DVec2::Y, stage);
-            error2(&spectrum, &filter, DMat2::IDENTITY, &area, None, beside_px)[0]
+            let waves = Waves::new(&spectrum, DMat2::IDENTITY, DMat2::IDENTITY, None);
+            error2(&waves, &waves.filtered(&filter), &waves.read(&area, None, beside_px))[0]
         };
         let half = DVec2::splat(0.5);
         assert!(error(TapStage::Bilinear, half) > 2.0 * error(TapStage::Bilinear, DVec2::ZERO));

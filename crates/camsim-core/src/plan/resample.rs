@@ -1,0 +1,61 @@
+//! What resampling costs at one place of the image, in any of many ways. Ways have most of their parts in common: what the texture has and what is wanted of it
+//! depends on the ideal frame's scale, what the surfaces' filter leaves on that and the filter, what the reads leave on that and the reads. Each part is worked
+//! out once a place.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::DVec2;
+
+use super::{
+    SurfaceReads,
+    prospect::Sight,
+    transfer::{Path, SurfaceFilter, Wave, Waves, error2},
+};
+use crate::temporal::{Footprint, TapStage};
+
+/// The parts that have been worked out for a place.
+#[derive(Debug, Default)]
+pub(super) struct Parts(Mutex<Known>);
+
+#[derive(Debug, Default)]
+struct Known {
+    waves: Vec<(Frame, Arc<Waves>)>,
+    filtered: Vec<((Frame, SurfaceReads), Arc<[f64]>)>,
+    read: Vec<((Frame, TapStage, Option<u32>), Arc<[[Wave; 2]]>)>,
+}
+
+/// The bits of an ideal frame's scale, and whether there is an exposure.
+type Frame = (u64, bool);
+
+/// What is known, or now found.
+fn known<K: PartialEq, V: Clone>(all: &mut Vec<(K, V)>, key: K, find: impl FnOnce() -> V) -> V {
+    if let Some((_, value)) = all.iter().find(|(known, _)| *known == key) {
+        return value.clone();
+    }
+    let value = find();
+    all.push((key, value.clone()));
+    value
+}
+
+impl Sight<'_> {
+    /// Expected squared error of a pixel here, as [`error2`] has it. `samples`: of the exposure, if it shows; `principal_px`: of the camera.
+    pub fn error2(&self, scale: f64, reads: SurfaceReads, taps: TapStage, samples: Option<u32>, principal_px: DVec2) -> [f64; 2] {
+        let sides = scale * self.camera_from_px;
+        let texel_from_ideal = self.texel_from_key * scale.recip();
+        let path = samples.map(|samples| Path { along: scale * self.path, samples });
+        let frame = (scale.to_bits(), path.is_some());
+        // A place is asked by one thread at a time; what is kept is replaced whole.
+        let mut parts = self.parts.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let Known { waves, filtered, read } = &mut *parts;
+        let waves = known(waves, frame, || {
+            Arc::new(Waves::new(self.spectrum, texel_from_ideal, self.key_from_camera * sides, path.map(|path| path.along)))
+        });
+        let filtered = known(filtered, (frame, reads), || waves.filtered(&SurfaceFilter::new(texel_from_ideal, reads)).into());
+        let read = known(read, (frame, taps, samples), || {
+            let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
+            let beside_px = (scale * self.key_px + principal_px).fract_gl();
+            waves.read(&area, path, beside_px).into()
+        });
+        error2(&waves, &filtered, &read)
+    }
+}
