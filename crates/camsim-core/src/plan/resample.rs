@@ -15,20 +15,23 @@ use crate::temporal::{Footprint, TapStage};
 
 /// The parts that have been worked out for a place.
 #[derive(Debug, Default)]
-pub(super) struct Parts(Mutex<Known>);
+pub(super) struct Parts(Box<Mutex<Known>>);
 
 #[derive(Debug, Default)]
 struct Known {
-    waves: Vec<(Frame, Arc<Waves>)>,
-    filtered: Vec<((Frame, SurfaceReads), Arc<[f64]>)>,
-    read: Vec<((Frame, TapStage, Option<u32>), Arc<[[Wave; 2]]>)>,
+    waves: Found<Frame, Waves>,
+    filtered: Found<(Frame, SurfaceReads), [f64]>,
+    read: Found<(Frame, TapStage, Option<u32>), [[Wave; 2]]>,
 }
+
+/// What was found for each key.
+type Found<K, V> = Vec<(K, Arc<V>)>;
 
 /// The bits of an ideal frame's scale, and whether there is an exposure.
 type Frame = (u64, bool);
 
 /// What is known, or now found.
-fn known<K: PartialEq, V: Clone>(all: &mut Vec<(K, V)>, key: K, find: impl FnOnce() -> V) -> V {
+fn known<K: PartialEq, V: ?Sized>(all: &mut Found<K, V>, key: K, find: impl FnOnce() -> Arc<V>) -> Arc<V> {
     if let Some((_, value)) = all.iter().find(|(known, _)| *known == key) {
         return value.clone();
     }
