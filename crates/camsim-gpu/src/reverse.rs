@@ -67,11 +67,15 @@ pub struct ReverseBindings<'a> {
 /// Head of the list of pixels before a frame: arguments of an empty dispatch, and no pixel.
 pub const EMPTY_LIST: [u32; 4] = [0, 1, 1, 0];
 
-/// Bytes for a list of all pixels of a picture.
+/// Bytes for a list of all pixels of a picture. A shader's structure is a multiple of its alignment long: the head and one pixel take 32.
 #[must_use]
 pub fn list_size(size_px: [u32; 2]) -> u64 {
-    4 * (EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]))
+    let words = EMPTY_LIST.len() as u64 + u64::from(size_px[0]) * u64::from(size_px[1]);
+    (4 * words).next_multiple_of(LIST_ALIGNMENT)
 }
+
+/// That of the `vec3<u32>` in a list's head.
+const LIST_ALIGNMENT: u64 = 16;
 
 /// Bind groups of one frame in flight with one ideal target: of the picture's kernel and those of its silhouettes, made when a key is first
 /// used. They go with the target, and when a buffer of the frame's is replaced.

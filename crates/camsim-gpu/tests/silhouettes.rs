@@ -5,7 +5,7 @@ mod common;
 use camsim_core::{
     plan::EdgeStage,
     reference::Oracle,
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes},
+    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Scene, Terrain},
     temporal::{
         edges::{KeyView, Keys, gather_edges},
@@ -317,4 +317,36 @@ fn bytes_do_not_depend_on_the_order_of_frames() {
         frames
     };
     assert!(all([0, 1, 2, 3]) == all([2, 0, 3, 1]), "order must not matter");
+}
+
+/// A camera of a few pixels, whose fields of view are wide: the roof's border is in all of them.
+fn tiny(size_px: [u32; 2], exposure_ms: f64, solver: Auto<Solver>) -> Scenario {
+    let mut scenario = camera();
+    scenario.camera.size_px = size_px;
+    scenario.camera.focal_px = [1.0, 1.0];
+    scenario.camera.principal_point_px = size_px.map(|side| 0.5 * f64::from(side - 1)).into();
+    scenario.camera.shutter = rolling(exposure_ms);
+    scenario.quality.solver = solver;
+    scenario
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_picture_may_have_a_single_pixel() {
+    let engine = engine();
+    let moving = (EAST, TURN);
+    let forced = [Solver::Linear, Solver::Rk2, Solver::Reproject].map(|solver| (Auto::Value(solver), moving));
+    let still = DVec3::ZERO;
+    let cases = [(Auto::Auto, (still, still)), (Auto::Auto, (still, TURN)), (Auto::Auto, moving)].into_iter().chain(forced);
+    for size_px in [[1, 1], [1, 2], [2, 1], [3, 1]] {
+        let mut listed = 0;
+        for ((solver, (velocity, rate)), exposure_ms) in cases.clone().flat_map(|case| [(case, 0.0), (case, 10.0)]) {
+            let sequence = sequence(tiny(size_px, exposure_ms, solver), steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
+            let done = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
+            let alpha: Vec<f32> = done.frame.color_rgba.chunks_exact(4).map(|pixel| pixel[3]).collect();
+            assert_eq!(alpha, vec![1.0; (size_px[0] * size_px[1]) as usize], "{size_px:?} {exposure_ms} ms {solver:?} {velocity} {rate}");
+            listed += u32::from(done.plan.edges != EdgeStage::None);
+        }
+        assert!(listed > 0, "{size_px:?}: no plan lists pixels");
+    }
 }
