@@ -69,7 +69,7 @@ impl FrameSource for Device<'_> {
 /// Share of `quality.max_error_dn` that the reference leaves as the standard error of a pixel.
 const SHARE_OF_TOLERANCE: f64 = 0.25;
 
-/// No texture is made of the ideal frame, so nearly any size will do.
+/// No texture is made of the ideal frame, so nearly any size will do, and any number of pixels.
 const MAX_IDEAL_SIDE_PX: u32 = 1 << 30;
 
 /// The oracle. Plans only say which ideal frame source coordinates refer to: the one that the engine would use.
@@ -86,7 +86,8 @@ impl Rays {
         let scenario = &sequence.scenario;
         let mut planned = Sequence::clone(sequence);
         planned.scenario.quality.solver = Auto::Auto;
-        let planner = Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX).or_bad_input()?;
+        let planner =
+            Planner::new(Arc::new(planned), &scenario.output.channels, MAX_IDEAL_SIDE_PX).or_bad_input()?.with_ideals_of_any_area();
         let options = RenderOptions {
             channels: scenario.output.channels.clone(),
             tolerance_dn: SHARE_OF_TOLERANCE * scenario.quality.max_error_dn,

@@ -66,6 +66,9 @@ pub const NEAR_M: f64 = 0.05;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
 
+/// Most pixels of the ideal frames of one output frame: at some 24 bytes a pixel, with colour, depth and what silhouettes take, 1.6 GB.
+pub const MAX_IDEAL_PX: u64 = 1 << 26;
+
 /// Errors of planning.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
@@ -80,7 +83,22 @@ pub enum PlanError {
         "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
     )]
     NoRay,
-    /// The ideal frame would be too large.
+    /// The ideal frame would have too many pixels for any memory, though its sides fit.
+    #[error(
+        "frame {frame} needs an ideal frame of {width}x{height} px, {:.0} million pixels, more than {:.0} million: the field of view is too wide for a \
+         flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view, or allow \
+         a larger quality.max_error_dn, for which it is made finer",
+        (.width * .height) as f64 * 1e-6, MAX_IDEAL_PX as f64 * 1e-6
+    )]
+    IdealOfTooManyPixels {
+        /// Frame number.
+        frame: u64,
+        /// Needed width.
+        width: u64,
+        /// Needed height.
+        height: u64,
+    },
+    /// A side of the ideal frame would be too long.
     #[error(
         "frame {frame} needs an ideal frame of {width}x{height} px, more than {limit} px a side: the field of view is too wide for a flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view"
     )]
@@ -223,6 +241,7 @@ pub struct Planner {
     surfaces: surfaces::Surfaces,
     truth: bool,
     max_side_px: u32,
+    max_ideal_px: u64,
     /// The last groups of frames that were looked at.
     groups: Mutex<sharing::Recent>,
 }
@@ -244,7 +263,14 @@ impl Planner {
         let outline = edges::SceneOutline::new(&sequence.scene);
         let grain = grain::SceneGrain::new(&sequence.scene);
         let surfaces = surfaces::Surfaces::new(sequence.scene.clone());
-        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px, groups: Mutex::default() })
+        let max_ideal_px = MAX_IDEAL_PX;
+        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px, max_ideal_px, groups: Mutex::default() })
+    }
+
+    /// For renderers that only want to know the geometry of the ideal frame and never make it: any number of pixels will do.
+    #[must_use]
+    pub fn with_ideals_of_any_area(self) -> Self {
+        Self { max_ideal_px: u64::MAX, ..self }
     }
 
     /// The sequence.
@@ -296,10 +322,7 @@ impl Planner {
             ideal = look.geometry(&[look.key()], sampling.scale, demanded);
             motion = look.motion_in(&ideal);
         }
-        if ideal.size_px.iter().any(|&side| side > self.max_side_px) {
-            let [width, height] = ideal.size_px.map(u64::from);
-            return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
-        }
+        self.check_size(frame, &ideal)?;
         let mut skipped = Vec::new();
         let camera = &look.reach.camera;
         let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
@@ -360,6 +383,7 @@ impl Planner {
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
             // These look, and read the depth, where the point is not.
             ideal = look.geometry(&[look.key()], sampling.scale, Some(temporal));
+            self.check_size(frame, &ideal)?;
         }
         motion::note_skips(&motion, temporal, &mut skipped);
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
@@ -412,6 +436,18 @@ impl Planner {
             skipped,
             price: picture.price + way.price(),
         })
+    }
+
+    /// Refuses an ideal frame that no renderer could hold.
+    fn check_size(&self, frame: u64, ideal: &IdealGeometry) -> Result<(), PlanError> {
+        let [width, height] = ideal.size_px.map(u64::from);
+        if width.max(height) > u64::from(self.max_side_px) {
+            return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
+        }
+        if width * height > self.max_ideal_px {
+            return Err(PlanError::IdealOfTooManyPixels { frame, width, height });
+        }
+        Ok(())
     }
 
     /// What the scenario as a whole makes unnecessary.

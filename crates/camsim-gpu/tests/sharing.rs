@@ -171,6 +171,27 @@ fn a_fault_of_one_frame_is_its_own() {
     assert!(planned(&spun, limit_px, 0).is_ok());
 }
 
+#[test]
+fn an_ideal_frame_that_no_memory_holds_is_refused_whatever_its_sides() {
+    let with_size = |size_px: [u32; 2]| {
+        let mut large = Sequence::clone(&flight(DVec3::ZERO, DVec3::ZERO, 1));
+        large.scenario.camera.lens = LensSpec::default();
+        large.scenario.camera.size_px = size_px;
+        large.scenario.camera.focal_px = [6000.0, 6000.0];
+        Arc::new(large)
+    };
+    assert!(planned(&with_size([6000, 4000]), 16_384, 0).is_ok());
+    let large = with_size([8000, 9000]);
+    let error = planned(&large, 16_384, 0).expect_err("more than 2^26 pixels").to_string();
+    assert!(
+        error.contains("frame 0") && error.contains("million pixels, more than 67 million") && error.contains("reduce camera.size_px"),
+        "{error}"
+    );
+    // Who makes no ideal frame does not mind.
+    let planner = Planner::new(large, &[Channel::Color], 16_384).expect("a planner").with_ideals_of_any_area();
+    assert!(planner.plan(0).is_ok());
+}
+
 fn planned(sequence: &Arc<Sequence>, max_side_px: u32, frame: u64) -> Result<FramePlan, PlanError> {
     Planner::new(sequence.clone(), &[Channel::Color], max_side_px).expect("a planner").plan(frame)
 }

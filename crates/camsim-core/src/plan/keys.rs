@@ -2,7 +2,7 @@
 //! silhouette; a second one, at another instant, sees most of it.
 
 use super::{
-    EdgeStage, Holes, Skip, TemporalStage,
+    EdgeStage, Holes, MAX_IDEAL_PX, Skip, TemporalStage,
     edges::{FINE_PIXEL_BYTES, scale_of},
 };
 use crate::{mount::CameraPath, pose::CameraPose, scenario::QualitySpec, temporal::IdealGeometry};
@@ -93,6 +93,8 @@ pub(super) fn fitting(
         let bytes = width * height * u64::from(count) * (PIXEL_BYTES + fine_bytes);
         let reason = if width.max(height * u64::from(count)) * scale > u64::from(max_side_px) {
             format!("{count} of {width}x{height} px are more than the {max_side_px} px a side that the adapter has; reduce camera.size_px")
+        } else if width * height * u64::from(count) > MAX_IDEAL_PX {
+            format!("{count} of {width}x{height} px are more than {} million px; reduce the field of view", MAX_IDEAL_PX / 1_000_000)
         } else if bytes > MAX_BYTES {
             format!("{count} of {width}x{height} px take {} MiB, more than {}; reduce the field of view", bytes >> 20, MAX_BYTES >> 20)
         } else {
@@ -140,9 +142,17 @@ mod tests {
         assert_eq!(count(4, 2047), (1, 3));
         assert_eq!(count(2, 1300), (1, 1));
         assert_eq!(count(1, 64), (1, 0));
-        // A gigapixel fits into no memory, whatever the adapter's textures hold.
+        // Their pixels add up, whether there are silhouettes or not.
+        let large =
+            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [6400, 6400], ..ideal });
+        let mut skipped = Vec::new();
+        assert!(
+            fitting(2, EdgeStage::None, 16_384, &mut skipped, large).is_none() && skipped[0].reason.contains("67 million px"),
+            "{skipped:?}"
+        );
+        // Their samples at silhouettes take more than the pixels do.
         let wide =
-            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [10_697, 6787], ..ideal });
+            |count: u32| ((0..count).map(|k| key(f64::from(k))).collect::<Vec<_>>(), IdealGeometry { size_px: [5000, 5000], ..ideal });
         let mut skipped = Vec::new();
         assert!(fitting(2, edges, 65_536, &mut skipped, wide).is_none() && skipped[0].reason.contains("MiB"), "{skipped:?}");
     }
