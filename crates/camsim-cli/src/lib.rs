@@ -22,6 +22,7 @@ mod output;
 mod progress;
 mod render_run;
 mod times_table;
+mod tolerances;
 
 use console::Console;
 use failure::Failure;

@@ -20,6 +20,7 @@ use crate::{
     frame_list::Shard,
     frame_source::FrameSource,
     progress::frames_bar,
+    tolerances::Tolerances,
 };
 
 /// What to render and where to.
@@ -94,30 +95,22 @@ pub fn run(
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
     let (mut blind, mut empty) = (0_u64, 0_u64);
+    let mut tolerances = Tolerances::new(&scenario.quality);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
     let rendered = source.render(&todo, &mut |finished| {
         look(&finished);
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
+        tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
         bar.inc(1);
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
     });
     bar.finish_and_clear();
     rendered?;
-    if blind > 0 {
-        console.warn(format_args!(
-            "{blind} of {} frames see no surface, only sky: check camera.mount, flight.height and where the scene lies",
-            todo.len()
-        ));
-    }
-    if empty > 0 {
-        console.warn(format_args!(
-            "{empty} of {} frames have no valid pixel: no ray of the camera's is in the ideal frame, or the lens has none; check \
-             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain`",
-            todo.len()
-        ));
-    }
+    let said: Vec<String> = unseen_warnings(blind, empty, todo.len()).chain(tolerances.iter().flat_map(Tolerances::warnings)).collect();
+    said.iter().for_each(|warning| console.warn(warning));
+    manifest.warnings.extend(said);
     let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);
     let time = begin.elapsed();
 
@@ -125,6 +118,20 @@ pub fn run(
     manifest.finished = true;
     manifest.write(job.folder).or_failed()?;
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time })
+}
+
+/// Of frames that see only sky, and of those without a valid pixel.
+fn unseen_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item = String> {
+    let blind = (blind > 0).then(|| {
+        format!("{blind} of {frames} frames see no surface, only sky: check camera.mount, flight.height and where the scene lies")
+    });
+    let empty = (empty > 0).then(|| {
+        format!(
+            "{empty} of {frames} frames have no valid pixel: no ray of the camera's is in the ideal frame, or the lens has none; check \
+             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain`"
+        )
+    });
+    blind.into_iter().chain(empty)
 }
 
 /// Whether nothing of a frame's colour is valid; a frame without colour is not known to be empty.

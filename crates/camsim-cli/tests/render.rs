@@ -210,6 +210,33 @@ fn an_empty_picture_is_neither_kept_nor_silent() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn tolerances_that_the_plans_break_are_said_once_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml");
+    let render = |more: &[&str]| {
+        let args = ["render", scenario.to_str().unwrap(), "-o", folder.path().to_str().unwrap(), "--format", "none", "--frames", "3..5"];
+        let small = ["--set", "camera.size_px=[96, 72]", "--set", "camera.focal_px=[63, 63]"];
+        let (code, out, err) = camsim(&[&args[..], &small, &["--set", "camera.principal_point_px=[47.5, 35.5]"], more].concat());
+        assert_eq!(code, 0, "{out}{err}");
+        (err, run_json(folder.path())["warnings"].to_string())
+    };
+    let strict = ["--set", "quality.max_error_px=1e-7", "--set", "quality.max_error_dn=1e-3"];
+    for said in <[String; 2]>::from(render(&strict)) {
+        for key in ["quality.max_error_px = 0.0000001", "quality.max_error_dn = 0.001"] {
+            assert_eq!(said.matches(&format!("2 of 2 frames do not keep {key}: in the worst, frame ")).count(), 1, "{said}");
+        }
+        assert!(said.contains("`camsim explain --frame "), "{said}");
+    }
+    let lax = ["--set", "quality.max_error_dn=20"];
+    for more in [&lax[..], &[&strict[..], &["--preset", "paper"]].concat(), &[&strict[..], &["--set", "quality.solver=linear"]].concat()] {
+        for said in <[String; 2]>::from(render(more)) {
+            assert!(!said.contains("do not keep"), "{more:?}: {said}");
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml");
     let verify = |more: &[&str]| {
