@@ -163,6 +163,9 @@ fn the_measured_error_stands_beside_the_predicted_one() {
     // Straight steps at constant velocity in a turn: beyond the tolerance, and the exit code says so.
     let (code, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=0.002"]);
     assert!(code == 1 && out.contains("BROKEN") && err.contains("the tolerance of 0.002 px is broken"), "{out}{err}");
+    // More than any adapter holds.
+    let (code, _, err) = verify(&["--set", "camera.size_px=[20000, 20000]"]);
+    assert!(code == 2 && err.contains("400000000 pixels") && err.contains("make camera.size_px smaller"), "{err}");
 }
 
 /// `verify` of the pattern, which is a plane, at 96x72.

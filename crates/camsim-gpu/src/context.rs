@@ -164,13 +164,19 @@ impl GpuContext {
         self.device.limits().max_texture_dimension_2d
     }
 
+    /// Largest storage buffer, bytes.
+    #[must_use]
+    pub fn max_storage_bytes(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
     /// Refuses what does not fit one storage buffer.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`].
     pub fn check_storage(&self, what: &str, bytes: u64, fix: &'static str) -> Result<(), GpuError> {
-        let limits = self.device.limits();
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = self.max_storage_bytes();
         if bytes <= limit {
             return Ok(());
         }

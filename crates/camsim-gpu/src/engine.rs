@@ -95,6 +95,12 @@ impl Engine {
         self.gpu.max_picture_px = max_side_px.min(self.gpu.max_side_px());
     }
 
+    /// Most pixels of an output frame with depth and coordinates.
+    #[must_use]
+    pub fn most_pixels_with_truth(&self) -> u64 {
+        self.gpu.max_storage_bytes() / size_of::<Truth>() as u64
+    }
+
     /// Uploads a sequence and prepares for its frames.
     ///
     /// # Errors

@@ -140,6 +140,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
     let engine = Engine::new(AdapterChoice::Best)?;
+    check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;
     let adapter = engine.gpu().adapter.to_string();
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
     let tolerance_px = scenario.quality.max_error_px;
@@ -168,13 +169,37 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(());
     }
     let broken: Vec<String> = report.frames.iter().filter(|frame| !frame.kept).map(|frame| frame.frame.to_string()).collect();
-    let first = report.frames.iter().find(|frame| !frame.kept);
-    let why = match first.map(|frame| (&frame.predicted.in_the_way, frame.measured.judged_by)) {
-        Some((Some(cause), _)) => format!("in the way is {cause}"),
-        Some((None, VOID)) => "too many pixels have a source only in one of the two pictures, or there is none".to_owned(),
-        _ => "the plan did not expect it".to_owned(),
-    };
+    let why = report.frames.iter().find(|frame| !frame.kept).map_or_else(String::new, why_broken);
     Err(Failure::failed(anyhow!("the tolerance of {tolerance_px} px is broken in frame {}: {why}", broken.join(", "))))
+}
+
+/// Coordinates are asked for here whatever `output.channels` says, so that leaving them out is no way out.
+fn check_size(size_px: [u32; 2], most: u64) -> Result<(), Failure> {
+    let [width, height] = size_px.map(u64::from);
+    if width * height <= most {
+        return Ok(());
+    }
+    Err(Failure::bad_input(anyhow!(
+        "camera.size_px = [{width}, {height}] is {} pixels, and this adapter can measure at most {most} in one frame: make camera.size_px smaller, \
+         and camera.focal_px and camera.principal_point_px in proportion",
+        width * height
+    )))
+}
+
+/// Of a frame whose tolerance is broken.
+fn why_broken(frame: &Verified) -> String {
+    let more =
+        if is_more_than_predicted(frame.as_predicted, frame.measured.judged_by) { ", and the error is larger than predicted" } else { "" };
+    match (&frame.predicted.in_the_way, frame.measured.judged_by) {
+        (Some(cause), _) => format!("in the way is {cause}{more}"),
+        (None, VOID) => "too many pixels have a source only in one of the two pictures, or there is none".to_owned(),
+        _ => "the plan did not expect it".to_owned(),
+    }
+}
+
+/// Where there is no error to compare there is none larger.
+fn is_more_than_predicted(as_predicted: bool, judged_by: &str) -> bool {
+    !as_predicted && judged_by != VOID
 }
 
 /// Frames spread evenly, the first and the last among them.
@@ -290,12 +315,7 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
     let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, hole_share } = measured;
     let terrain_off = verified.level_of_detail.as_ref().map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
     let share = 100.0 * silhouettes.pixels as f64 / all.pixels.max(1) as f64;
-    let verdict = match (verified.kept, verified.as_predicted) {
-        (true, true) => "kept",
-        (true, false) => "kept, but more than predicted",
-        (false, _) if predicted.kept => "BROKEN against the prediction",
-        (false, _) => "BROKEN as predicted",
-    };
+    let verdict = verdict([verified.kept, verified.as_predicted, predicted.kept], judged_by);
     let why = match *judged_by {
         "all" => format!(": hardly a pixel away from silhouettes, {:.2e} px of all", all.p99_px),
         VOID => ": too many pixels without a source".to_owned(),
@@ -327,6 +347,17 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
     Ok(())
 }
 
+/// The tolerance and the prediction are kept or broken each by itself.
+fn verdict([kept, as_predicted, predicted_kept]: [bool; 3], judged_by: &str) -> &'static str {
+    match (kept, predicted_kept) {
+        (true, _) if as_predicted => "kept",
+        (true, _) => "kept, but more than predicted",
+        (false, true) => "BROKEN against the prediction",
+        (false, false) if is_more_than_predicted(as_predicted, judged_by) => "BROKEN, and more than predicted",
+        (false, false) => "BROKEN as predicted",
+    }
+}
+
 /// PSNR of the pixels that `quality.max_error_dn` bounds.
 fn bounded_db(errors: &ImageErrors, predicted: &Predicted) -> f64 {
     if predicted.silhouettes.is_some() { errors.all_db } else { errors.smooth_db }
@@ -344,6 +375,8 @@ fn estimate(rms_dn: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+
     use super::*;
 
     #[test]
@@ -351,6 +384,23 @@ mod tests {
         assert_eq!(estimate(2.55), "40.00 dB");
         assert_eq!(estimate(0.0), "no error");
         assert!((rms_dn(40.0) - 2.55).abs() < 1e-12 && rms_dn(f64::INFINITY) == 0.0);
+    }
+
+    #[test]
+    fn what_is_broken_and_what_was_foreseen_are_told_apart() {
+        assert_eq!(verdict([true, true, true], "smooth"), "kept");
+        assert_eq!(verdict([true, false, true], "smooth"), "kept, but more than predicted");
+        assert_eq!(verdict([false, false, true], "smooth"), "BROKEN against the prediction");
+        assert_eq!(verdict([false, true, false], "all"), "BROKEN as predicted");
+        assert_eq!(verdict([false, false, false], "smooth"), "BROKEN, and more than predicted");
+        assert_eq!(verdict([false, false, false], VOID), "BROKEN as predicted");
+    }
+
+    #[test]
+    fn a_picture_that_cannot_be_measured_is_refused_with_the_most_that_can() {
+        assert!(check_size([2048, 2048], 4_194_304).is_ok());
+        let error = check_size([4000, 3000], 4_194_304).unwrap_err().to_string();
+        assert!(error.contains("12000000 pixels") && error.contains("at most 4194304") && !error.contains("output.channels"), "{error}");
     }
 
     #[test]
