@@ -253,6 +253,11 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
     let unknown = file("unknown.toml", "[flight]\nlogg = \"a.csv\"\n[scene]\n");
     let no_log = file("no_log.toml", "[flight]\nlog = \"nowhere.csv\"\n[scene.pattern]\nimage = \"a.png\"\nwidth_m = 9.0\n");
     let binary = file("binary.toml", "\u{1}\u{2}\0");
+    let demo = text(&assets().join("demo.toml")).to_owned();
+    let no_heights = format!("scene.terrain.dem={picture}");
+    let latin = folder.path().join("latin.toml");
+    fs::write(&latin, b"# K\xf6ln\n").unwrap();
+    let latin = text(&latin).to_owned();
     let words = file("words.csv", "u,v\n1,two\n");
     let no_focal = file("no_focal.toml", "size_px = [640, 480]\nfocal_px = [0.0, 100.0]\n");
     let cases: Vec<(Vec<&str>, &str)> = vec![
@@ -263,6 +268,12 @@ fn bad_input_is_refused_with_its_place_and_a_way_out() {
         (vec!["render", &binary], "binary.toml"),
         (vec!["render", &unknown], "log"),
         (vec!["render", &no_log], "nowhere.csv"),
+        (vec!["render", &latin], "latin.toml: not UTF-8 text (bad byte at offset 3)"),
+        (vec!["render", &demo, "--set", "scene.terrain.dem=none.tif"], "; check scene.terrain.dem"),
+        (vec!["render", &demo, "--set", &no_heights], "not a TIFF file; check scene.terrain.dem"),
+        (vec!["render", &demo, "--set", "scene.terrain.ortho=none.jpg"], "; check scene.terrain.ortho"),
+        (vec!["explain", &scenario, "--set", "scene.pattern.image=none.png"], "; check scene.pattern.image"),
+        (vec!["explain", &scenario, "--set", "camera.photometric.vignette=none.png"], "; check camera.photometric.vignette"),
         (vec!["render", &scenario, "--frames", "5..2"], "holds no frame"),
         (vec!["render", &scenario, "--frames", "58..99"], "ends with frame 59"),
         (vec!["render", &scenario, "--shard", "5/4"], "I from 1 to N"),

@@ -39,8 +39,13 @@ pub enum LoadError {
     #[error(transparent)]
     Terrain(#[from] TerrainFileError),
     /// A picture.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
+    #[error("{source}; check {key}")]
+    Picture {
+        /// Which one it is.
+        key: &'static str,
+        /// What is wrong.
+        source: PictureError,
+    },
     /// A local log over a georeferenced terrain.
     #[error(
         "{log} has local coordinates, but scene.terrain is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
@@ -95,7 +100,8 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
     let (log, tracked) = load_flight(scenario)?;
     let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount)?;
     let (scene, terrain) = load_scene(scenario, &log)?;
-    let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose()?.map(Arc::new);
+    let of_vignette = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
+    let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose().map_err(of_vignette)?.map(Arc::new);
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let sequence = Sequence {
@@ -154,7 +160,8 @@ fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<Ter
         summary = Some(loaded.summary);
     }
     if let Some(pattern) = &spec.pattern {
-        let texture = read_texture(&pattern.image, Encoding::Srgb)?;
+        let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
+        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(of_pattern)?;
         let centre = match pattern.at {
             PatternCentre::Origin => DVec3::ZERO,
             PatternCentre::Ned(ned) => DVec3::from_array(ned),

@@ -25,6 +25,14 @@ pub enum ScenarioError {
         /// Reason.
         source: std::io::Error,
     },
+    /// Not UTF-8 text.
+    #[error("{}: not UTF-8 text (bad byte at offset {offset}); scenarios and camera files are TOML, which is text: save it as UTF-8", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// First bad byte.
+        offset: usize,
+    },
     /// Not TOML.
     #[error("{}:{line}: not valid TOML: {message}", path.display())]
     Syntax {

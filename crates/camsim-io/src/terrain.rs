@@ -68,8 +68,13 @@ pub struct TerrainSummary {
 #[derive(Debug, thiserror::Error)]
 pub enum TerrainFileError {
     /// A file that cannot be read or decoded.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
+    #[error("{source}; check {key}")]
+    Picture {
+        /// Which one it is.
+        key: &'static str,
+        /// What is wrong.
+        source: PictureError,
+    },
     /// A picture where heights are wanted.
     #[error("{path}: has {bands} bands, so it is a picture and no DEM: heights are one band (scene.terrain.ortho takes the picture)")]
     NotHeights {
@@ -168,6 +173,16 @@ pub enum TerrainFileError {
         /// The DEM.
         dem: PathBuf,
     },
+}
+
+impl TerrainFileError {
+    fn of_dem(source: PictureError) -> Self {
+        Self::Picture { key: "scene.terrain.dem", source }
+    }
+
+    fn of_ortho(source: PictureError) -> Self {
+        Self::Picture { key: "scene.terrain.ortho", source }
+    }
 }
 
 /// Reads `scene.terrain`. Paths are used as they stand. `height_shift` is added to the heights of the file where its vertical datum is not

@@ -41,8 +41,10 @@ pub(crate) struct Tree {
 impl Tree {
     /// Reads `path`; keys are placed under `prefix`.
     pub(crate) fn read(path: &Path, prefix: &str) -> Result<Self, ScenarioError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
-        Self::parse(text.strip_prefix('\u{feff}').unwrap_or(&text), path, prefix)
+        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
+        let not_text = |error: std::str::Utf8Error| ScenarioError::NotText { path: path.into(), offset: error.valid_up_to() };
+        let text = std::str::from_utf8(&bytes).map_err(not_text)?;
+        Self::parse(text.strip_prefix('\u{feff}').unwrap_or(text), path, prefix)
     }
 
     /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its header, is refused as a whole.

@@ -48,7 +48,7 @@ pub(super) fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
 
 impl Dem {
     pub fn read(path: &Path, wanted_epsg: Option<u16>) -> Result<Self, TerrainFileError> {
-        let raster = Raster::read(path)?;
+        let raster = Raster::read(path).map_err(TerrainFileError::of_dem)?;
         let geo = &raster.geo;
         let epsg = match (geo.epsg, wanted_epsg) {
             (Some(stated), Some(wanted)) if stated != wanted && Crs::new(stated).is_some() => {

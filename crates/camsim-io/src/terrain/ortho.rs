@@ -9,9 +9,9 @@ use super::{
     crs::Crs,
     dem::{Dem, georeference_of},
     georeference::Affine,
-    raster::{self, Raster},
+    raster::{self, GeoTags, Raster},
 };
-use crate::pictures::read_texture;
+use crate::pictures::{PictureError, read_texture};
 
 /// A picture of the ground.
 pub(super) struct Ortho {
@@ -42,12 +42,7 @@ impl OrthoPlace {
 
 impl Ortho {
     pub fn read(path: &Path, dem: &Dem) -> Result<Self, TerrainFileError> {
-        let (mut texture, geo) = if raster::is_tiff(path)? {
-            let raster = Raster::read(path)?;
-            (raster.to_texture(path, Encoding::Srgb)?, Some(raster.geo))
-        } else {
-            (read_texture(path, Encoding::Srgb)?, None)
-        };
+        let (mut texture, geo) = picture(path).map_err(TerrainFileError::of_ortho)?;
         let Some(model_from_pixel) = georeference_of(path, geo.as_ref().and_then(|geo| geo.model_from_pixel))? else {
             texture.bleed_into_transparent();
             return Ok(Self { texture, place: None });
@@ -62,6 +57,15 @@ impl Ortho {
         texture.bleed_into_transparent();
         Ok(Self { texture, place: Some(OrthoPlace { pixel_from_model, crs, size }) })
     }
+}
+
+/// With what a TIFF file says about its place.
+fn picture(path: &Path) -> Result<(Texture, Option<GeoTags>), PictureError> {
+    if !raster::is_tiff(path)? {
+        return Ok((read_texture(path, Encoding::Srgb)?, None));
+    }
+    let raster = Raster::read(path)?;
+    Ok((raster.to_texture(path, Encoding::Srgb)?, Some(raster.geo)))
 }
 
 /// Black pixels over voids of a DEM on the same grid are no content: otherwise they would darken the rim of what is there.
