@@ -71,6 +71,11 @@ fn timing_runs_write_no_frame() {
         camsim(&["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0,3", "--format", "none"]);
     assert!(code == 0 && out.starts_with("2 frames in") && !folder.join("color").exists(), "{out}{err}");
     assert_eq!(run_json(&folder)["written"].as_u64(), Some(2));
+    // What was asked for by name is said in a quiet run too.
+    let quiet =
+        ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0", "--format", "none", "--times", "-q"];
+    let (code, out, err) = camsim(&quiet);
+    assert!(code == 0 && out.starts_with("ms a frame") && out.contains("host: plan") && err.is_empty(), "{out}{err}");
 }
 
 /// Set in the copy of this test that runs where no adapter can be found.

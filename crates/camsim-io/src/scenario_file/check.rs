@@ -80,8 +80,9 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         Kind::Number => (number(value), "a number".to_owned()),
         Kind::NumberOr(words) => (number(value) || among(value, words), format!("a number or {}", list(words))),
         Kind::Whole => (whole(value), "a whole number, 0 or more".to_owned()),
-        Kind::UpTo(most) => {
-            (value.as_integer().is_some_and(|v| (0..=i64::from(most)).contains(&v)), format!("a whole number, 0 to {most}"))
+        Kind::Within(least, most) => {
+            let range = i64::from(least)..=i64::from(most);
+            (value.as_integer().is_some_and(|v| range.contains(&v)), format!("a whole number, {least} to {most}"))
         }
         Kind::CountOr(most, words) => (count(value) || among(value, words), format!("a whole number up to {most} or {}", list(words))),
         Kind::Numbers(n) => (all(value, Some(n), &number), format!("a list of {n} numbers")),

@@ -31,8 +31,8 @@ pub(crate) enum Kind {
     NumberOr(&'static [&'static str]),
     /// A whole number from 0, beyond 32 bits too.
     Whole,
-    /// A whole number from 0 to this one.
-    UpTo(u32),
+    /// A whole number from the first to the last.
+    Within(u32, u32),
     /// A whole number of at most 32 bits, or one of these words. The message names the most that makes sense; ranges are checked later.
     CountOr(u32, &'static [&'static str]),
     /// That many numbers.
@@ -113,7 +113,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("scene.terrain.dem", Path),
     ("scene.terrain.ortho", Path),
     ("scene.terrain.height", Word(HEIGHT)),
-    ("scene.terrain.epsg", UpTo(u16::MAX as u32)),
+    ("scene.terrain.epsg", Within(0, u16::MAX as u32)),
     ("scene.pattern.image", Path),
     ("scene.pattern.width_m", Number),
     ("scene.pattern.at", NumbersOr(3, "origin")),
@@ -130,7 +130,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.footprint_taps", CountOr(MAX_FOOTPRINT_TAPS, AUTO)),
     ("quality.ideal_scale", NumberOr(AUTO)),
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
-    ("quality.frames_per_ideal", UpTo(MAX_FRAMES_PER_IDEAL)),
+    ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),
@@ -178,9 +178,12 @@ impl Schema {
             if its_parent == parent { alike + 0.15 } else { alike }
         };
         let best = names.into_iter().max_by(|a, b| score(a).total_cmp(&score(b)))?;
-        (score(&best) > 0.72).then(|| best.to_owned())
+        (score(&best) > NEAR).then(|| best.to_owned())
     }
 }
+
+/// Likeness of a key that is worth naming: `fsp` beside `fps` has 0.82, words of four or five letters that share one have up to 0.79.
+const NEAR: f64 = 0.8;
 
 /// The word of `words` that is most like `word`.
 pub(super) fn nearest_word<'a>(word: &str, words: &[&'a str]) -> Option<&'a str> {
