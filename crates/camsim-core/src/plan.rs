@@ -86,8 +86,7 @@ pub enum PlanError {
     /// The ideal frame would have too many pixels for any memory, though its sides fit.
     #[error(
         "frame {frame} needs an ideal frame of {width}x{height} px, {:.0} million pixels, more than {:.0} million: the field of view is too wide for a \
-         flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view, or allow \
-         a larger quality.max_error_dn, for which it is made finer",
+         flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view",
         (.width * .height) as f64 * 1e-6, MAX_IDEAL_PX as f64 * 1e-6
     )]
     IdealOfTooManyPixels {

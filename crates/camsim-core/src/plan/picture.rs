@@ -81,8 +81,9 @@ impl Look<'_> {
 
     /// Scale from which on the ideal frame is too large.
     fn most_scale(&self, scenery: &Scenery<'_>) -> f64 {
-        let [width, height] = scenery.ideal.size_px;
-        f64::from(self.planner.max_side_px) / f64::from(width.max(height)) * self.reach.least_scale()
+        let [width, height] = scenery.ideal.size_px.map(f64::from);
+        let by_area = (self.planner.max_ideal_px as f64 / (width * height)).sqrt();
+        by_area.min(f64::from(self.planner.max_side_px) / width.max(height)) * self.reach.least_scale()
     }
 
     /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
