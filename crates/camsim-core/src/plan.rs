@@ -9,13 +9,13 @@ use glam::DVec2;
 use serde::Serialize;
 
 use crate::{
-    camera::{CameraError, CameraModel, ZoomTable},
+    camera::{CameraModel, ZoomTable},
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
     scenario::{Channel, Preset},
     sequence::Sequence,
-    shutter::{LinesAxis, Shutter, ShutterError},
+    shutter::{LinesAxis, Shutter},
     temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
@@ -36,8 +36,10 @@ mod look;
 mod motion;
 pub mod paper;
 mod picture;
+mod predicted;
 mod probes;
 mod prospect;
+mod refusal;
 mod resample;
 mod rounding;
 mod sharing;
@@ -53,11 +55,12 @@ pub use contours::Contours;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
-pub use error::Predicted;
 pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
+pub use predicted::Predicted;
+pub use refusal::{MAX_IDEAL_PX, PlanError};
 pub use sight::Sight;
 pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, TemporalStage};
 
@@ -65,53 +68,6 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 pub const NEAR_M: f64 = 0.05;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
-
-/// Most pixels of the ideal frames of one output frame: at some 24 bytes a pixel, with colour, depth and what silhouettes take, 1.6 GB.
-pub const MAX_IDEAL_PX: u64 = 1 << 26;
-
-/// Errors of planning.
-#[derive(Debug, thiserror::Error)]
-pub enum PlanError {
-    /// The camera cannot be used.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// The shutter cannot be used.
-    #[error(transparent)]
-    Shutter(#[from] ShutterError),
-    /// No pixel has a pre-image.
-    #[error(
-        "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
-    )]
-    NoRay,
-    /// The ideal frame would have too many pixels for any memory, though its sides fit.
-    #[error(
-        "frame {frame} needs an ideal frame of {width}x{height} px, {:.0} million pixels, more than {:.0} million: the field of view is too wide for a \
-         flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view",
-        (.width * .height) as f64 * 1e-6, MAX_IDEAL_PX as f64 * 1e-6
-    )]
-    IdealOfTooManyPixels {
-        /// Frame number.
-        frame: u64,
-        /// Needed width.
-        width: u64,
-        /// Needed height.
-        height: u64,
-    },
-    /// A side of the ideal frame would be too long.
-    #[error(
-        "frame {frame} needs an ideal frame of {width}x{height} px, more than {limit} px a side: the field of view is too wide for a flat ideal frame, or the motion within one frame too large; reduce camera.size_px, camera.shutter times or the field of view"
-    )]
-    IdealTooLarge {
-        /// Frame number.
-        frame: u64,
-        /// Needed width.
-        width: u64,
-        /// Needed height.
-        height: u64,
-        /// Largest side.
-        limit: u32,
-    },
-}
 
 /// What moves within the frame: bounds that the choices rest on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -321,7 +277,7 @@ impl Planner {
             ideal = look.geometry(&[look.key()], sampling.scale, demanded);
             motion = look.motion_in(&ideal);
         }
-        self.check_size(frame, &ideal)?;
+        refusal::check_size(frame, ideal.size_px, self.max_side_px, self.max_ideal_px)?;
         let mut skipped = Vec::new();
         let camera = &look.reach.camera;
         let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };
@@ -382,7 +338,7 @@ impl Planner {
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
             // These look, and read the depth, where the point is not.
             ideal = look.geometry(&[look.key()], sampling.scale, Some(temporal));
-            self.check_size(frame, &ideal)?;
+            refusal::check_size(frame, ideal.size_px, self.max_side_px, self.max_ideal_px)?;
         }
         motion::note_skips(&motion, temporal, &mut skipped);
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
@@ -435,18 +391,6 @@ impl Planner {
             skipped,
             price: picture.price + way.price(),
         })
-    }
-
-    /// Refuses an ideal frame that no renderer could hold.
-    fn check_size(&self, frame: u64, ideal: &IdealGeometry) -> Result<(), PlanError> {
-        let [width, height] = ideal.size_px.map(u64::from);
-        if width.max(height) > u64::from(self.max_side_px) {
-            return Err(PlanError::IdealTooLarge { frame, width, height, limit: self.max_side_px });
-        }
-        if width * height > self.max_ideal_px {
-            return Err(PlanError::IdealOfTooManyPixels { frame, width, height });
-        }
-        Ok(())
     }
 
     /// What the scenario as a whole makes unnecessary.

@@ -23,7 +23,7 @@ use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
     ideal::{IdealPass, IdealTarget},
     layout::Truth,
-    recorder::{PassClock, PassTime, Recorder},
+    recorder::{PassClock, Recorder},
     reverse::{
         EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms,
         lens_inverse::{LensInversePass, LensMap},
@@ -35,6 +35,7 @@ use crate::{
 
 mod ahead;
 mod error;
+mod finished;
 mod inspect;
 mod readback;
 mod slot;
@@ -42,6 +43,7 @@ mod slot;
 use ahead::{Ahead, Prepared, Preparer};
 pub use error::RenderError;
 pub(crate) use error::RenderErrorBase;
+pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
 use readback::{Output, coords, look_for_unknown, read_mapped};
 use slot::{Slot, Target, list_buffer, pose_buffer};
@@ -207,36 +209,6 @@ struct InFlight {
     submission: wgpu::SubmissionIndex,
     lod: LodSelection,
     times: FrameTimes,
-}
-
-/// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FrameTimes {
-    /// The host planned it and computed its tables, on another thread than what follows.
-    pub plan_ms: f64,
-    /// The host wrote its tables and recorded its passes.
-    pub record_ms: f64,
-    /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame before.
-    pub submit_ms: f64,
-    /// The host waited for the device.
-    pub wait_ms: f64,
-    /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what pixels at silhouettes see.
-    pub read_ms: f64,
-    /// What ran on the device, if asked for ([`Session::time_passes`]) and if the adapter has time stamps.
-    pub passes: Vec<PassTime>,
-}
-
-/// A finished frame with the plan it was made by.
-#[derive(Debug)]
-pub struct Finished {
-    /// The pictures.
-    pub frame: RenderedFrame,
-    /// The plan.
-    pub plan: FramePlan,
-    /// The terrain's level of detail.
-    pub lod: LodSelection,
-    /// Where its time went.
-    pub times: FrameTimes,
 }
 
 impl Session<'_> {

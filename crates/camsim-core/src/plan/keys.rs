@@ -11,7 +11,7 @@ use crate::{mount::CameraPath, pose::CameraPose, scenario::QualitySpec, temporal
 pub const MAX_KEYS: u32 = 4;
 /// Colour and depth of an ideal pixel.
 const PIXEL_BYTES: u64 = 12;
-/// Memory that more than one ideal frame may take.
+/// Memory that more than one ideal frame may take, with the finer pictures of silhouettes.
 const MAX_BYTES: u64 = 2 << 30;
 /// Allocated heights are multiples of this.
 pub const SIZE_QUANTUM_PX: u32 = 64;
