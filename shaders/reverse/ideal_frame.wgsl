@@ -3,6 +3,17 @@
 @group(1) @binding(1) var ideal_sampler: sampler;
 @group(1) @binding(2) var ideal_depth: texture_2d<f32>;
 
+// A number of the frame that says where the kernel goes: how often a loop turns, whether there is something to do. What follows from uniforms alone makes
+// Mesa's lavapipe compile the kernel anew, for one frame after the other, half a second each time; what also depends on a texture it leaves alone.
+fn told(count: u32) -> u32 {
+    return min(count, 65536u * textureDimensions(ideal_color).x);
+}
+
+// Phase of the exposure at which coordinates are asked for.
+fn coords_phase() -> f32 {
+    return f32(told(1u)) * frame.coords_phase;
+}
+
 // A direction seen from the key camera (any positive scale) to ideal pixels.
 fn ideal_px_from_point(in_key: vec3<f32>) -> vec2<f32> {
     return frame.ideal_focal_px * (in_key.xy / in_key.z) + frame.ideal_principal_px;

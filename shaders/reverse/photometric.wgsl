@@ -12,13 +12,14 @@ fn vignette_weight(pixel: vec2<u32>) -> f32 {
 
 fn photometric(pixel: vec2<u32>, color: vec3<f32>, weight: f32) -> vec3<f32> {
     var value = color;
-    if (frame.mono == 1u) {
+    let mono = told(frame.mono) == 1u;
+    if (mono) {
         value = vec3<f32>(dot(color, vec3<f32>(0.2126, 0.7152, 0.0722)));
     }
     value *= weight * frame.light;
-    if (frame.noise_sigma > 0.0) {
+    if (told(u32(frame.noise_sigma > 0.0)) == 1u) {
         let n = normal4(pixel, NOISE_STREAM);
-        value += frame.noise_sigma * select(n.xyz, n.xxx, frame.mono == 1u);
+        value += frame.noise_sigma * select(n.xyz, n.xxx, mono);
     }
     return clamp(value, vec3<f32>(0.0), vec3<f32>(1.0));
 }

@@ -36,7 +36,7 @@ fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let ray = lens_ray(pixel);
     use_key_of_line(pixel);
     // Without samples the list is for depth and coordinates alone.
-    if (frame.edge_samples > 0u && (marked || (HAS_PARALLAX && !sees_one_surface(pixel, ray)))) {
+    if (told(frame.edge_samples) > 0u && (marked || (HAS_PARALLAX && !sees_one_surface(pixel, ray)))) {
         let color = rays_color(pixel, ray);
         emit(pixel, output_color(photometric(pixel, after_gather(ray, color), vignette_weight(pixel))));
     }

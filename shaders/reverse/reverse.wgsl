@@ -41,6 +41,6 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     emit(pixel, output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)));
     if (EMITS_RAYS) {
-        emit_truth(pixel, ray, smooth_px_at_phase(pixel, ray, frame.coords_phase), smooth_mid(pixel, ray));
+        emit_truth(pixel, ray, smooth_px_at_phase(pixel, ray, coords_phase()), smooth_mid(pixel, ray));
     }
 }

@@ -2,7 +2,7 @@
 // Twin of the fog: camsim_core::temporal::paper::linear_fog.
 
 fn after_gather(ray: Ray, color: vec3<f32>) -> vec3<f32> {
-    if (frame.linear_fog.w == 0.0) {
+    if (told(u32(frame.linear_fog.w == 0.0)) == 1u) {
         return color;
     }
     let w = constant_depth(frame.ideal_focal_px * ray.uv + frame.ideal_principal_px);

@@ -23,12 +23,13 @@ struct Candidates {
 // Whether rays of this pixel may meet another surface than the plain gather did: at the ends and in the middle of the exposure, since the corner of a
 // surface may pass by in between.
 fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
-    for (var node = 0u; node < frame.nodes; node += max(frame.nodes - 1u, 1u)) {
+    let nodes = told(frame.nodes);
+    for (var node = 0u; node < nodes; node += max(nodes - 1u, 1u)) {
         if (near_edge(ray.uv, pose_at_node(pixel, node))) {
             return true;
         }
     }
-    return (EMITS_RAYS || frame.nodes > 1u) && near_edge(ray.uv, pose_mid(pixel));
+    return (EMITS_RAYS || nodes > 1u) && near_edge(ray.uv, pose_mid(pixel));
 }
 
 @compute @workgroup_size(64)

@@ -106,7 +106,7 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
     let along = share * f32(frame.nodes - 1u);
     let node = min(u32(along), max(frame.nodes, 2u) - 2u);
     let pose = pose_at_node(pixel, node);
-    if (frame.nodes > 1u) {
+    if (told(frame.nodes) > 1u) {
         return mix_pose(pose, pose_at_node(pixel, node + 1u), along - f32(node));
     }
     return pose;
@@ -116,7 +116,7 @@ fn pose_along(pixel: vec2<u32>, share: f32) -> Pose {
 // that meet what the plain gather took saw one surface all over the pixel, and that one is better read by the spline.
 fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
     // As in candidates.wgsl.
-    let instants = select(1u, 3u, frame.nodes > 1u);
+    let instants = select(1u, 3u, told(frame.nodes) > 1u);
     for (var i = 0u; i < instants; i++) {
         let pose = pose_along(pixel, select(0.5, 0.5 * f32(i), instants > 1u));
         if (near_edge(ray.uv, pose)) {
@@ -135,7 +135,8 @@ fn sees_one_surface(pixel: vec2<u32>, ray: Ray) -> bool {
 // Mean colour of the pixel's rays.
 fn rays_color(pixel: vec2<u32>, ray: Ray) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    for (var i = 0u; i < frame.edge_samples; i++) {
+    let samples = told(frame.edge_samples);
+    for (var i = 0u; i < samples; i++) {
         let place = ray_place(i);
         let found = first_surface_of_keys(pixel, ray.uv + place.x * ray.d_dx + place.y * ray.d_dy, place.z);
         sum += surface_color_at(found.at_px);
@@ -173,8 +174,8 @@ fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
 fn emit_centre(pixel: vec2<u32>, ray: Ray) {
     use_key_of_line(pixel);
     if (!IS_EXACT) {
-        emit_truth(pixel, ray, seen_px_at_phase(pixel, ray, frame.coords_phase), seen_mid(pixel, ray));
-    } else if (near_edge(ray.uv, pose_mid(pixel)) || near_edge(ray.uv, pose_along(pixel, frame.coords_phase + 0.5))) {
+        emit_truth(pixel, ray, seen_px_at_phase(pixel, ray, coords_phase()), seen_mid(pixel, ray));
+    } else if (near_edge(ray.uv, pose_mid(pixel)) || near_edge(ray.uv, pose_along(pixel, coords_phase() + 0.5))) {
         emit_unknown(pixel, ray);
     }
 }

@@ -17,7 +17,7 @@ fn nodes_of_stretch() -> u32 {
 }
 
 fn stretch_count() -> u32 {
-    return (frame.nodes - 1u) / nodes_of_stretch();
+    return told((frame.nodes - 1u) / nodes_of_stretch());
 }
 
 fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {

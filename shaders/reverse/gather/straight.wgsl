@@ -26,7 +26,8 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let first_at = (clamp(ends.first_px, vec2<f32>(0.0), last) + 0.5) / size;
     let last_at = (clamp(ends.last_px, vec2<f32>(0.0), last) + 0.5) / size;
     var sum = vec3<f32>(0.0);
-    for (var i = 0u; i < frame.max_samples; i++) {
+    let samples = told(frame.max_samples);
+    for (var i = 0u; i < samples; i++) {
         sum += textureSampleLevel(ideal_color, ideal_sampler, mix(first_at, last_at, sample_share(i)), 0.0).rgb;
     }
     return Gathered(vec4<f32>(sum / f32(frame.max_samples), 1.0), ends.inside, array(ends.first_px, ends.last_px));

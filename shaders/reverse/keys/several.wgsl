@@ -4,7 +4,7 @@
 var<private> chosen_key: u32 = 0u;
 
 fn key_count() -> u32 {
-    return frame.keys;
+    return told(frame.keys);
 }
 
 // Mid-exposure of the pixel's line as a share of the window.
@@ -20,7 +20,7 @@ fn use_rank(share: f32, rank: u32) {
     var used = 0u;
     for (var i = 0u; i <= rank; i++) {
         var least = 1e30;
-        for (var key = 0u; key < frame.keys; key++) {
+        for (var key = 0u; key < key_count(); key++) {
             let away = abs(share * f32(frame.keys) - f32(key) - 0.5);
             if (away < least && (used & (1u << key)) == 0u) {
                 least = away;

@@ -14,8 +14,9 @@ struct Settled {
 
 // `guess`: what the key frame is taken to have there at first, 1/m.
 fn settle(direction: vec3<f32>, shift: vec3<f32>, guess: f32, iterations: u32) -> Settled {
+    let looks = told(iterations);
     var settled = Settled(guess, depth_on_line(direction, shift, guess, 0.0));
-    for (var i = 0u; i < iterations; i++) {
+    for (var i = 0u; i < looks; i++) {
         settled.in_key = inverse_depth(ideal_px_from_point(direction + settled.on_line * shift));
         settled.on_line = depth_on_line(direction, shift, settled.in_key, settled.on_line);
     }
