@@ -16,6 +16,7 @@ use crate::{
 
 pub mod ablation;
 mod blit;
+mod confirm;
 pub mod knobs;
 mod measure;
 mod pareto;
@@ -146,13 +147,14 @@ pub fn run<E: From<BenchError>>(engine: &Engine, options: &Options, watch: &mut 
         let place = report.cases[0] + 1;
         watch(Step::Begins(&format!("{place} of {}: {}, {} rows{rest}", report.cases[1], case.name, variants.len())))?;
         report.refused.extend(refused);
-        report.rows.extend(measure::case(engine, case, &variants, effort)?);
+        let mut rows = measure::case(engine, case, &variants, effort)?;
+        pareto::mark_fronts(&mut rows);
+        report.violations.extend(confirm::confirmed(engine, &variants, pareto::violations(&rows), effort)?);
+        report.rows.extend(rows);
         if case.name == WHOLE && !options.quick {
             watch(Step::Begins("each effect left out"))?;
             report.ablation = ablation::measure(engine, &case.sequence, effort)?;
         }
-        pareto::mark_fronts(&mut report.rows);
-        report.violations = pareto::violations(&report.rows);
         report.cases[0] = place;
         report.elapsed_s = begin.elapsed().as_secs_f64();
         watch(Step::Done(&report))?;

@@ -91,6 +91,11 @@ fn picture_than(other: &Row, row: &Row) -> Than {
     }
 }
 
+/// Whether times over those of another row are clearly above 1.
+pub(super) fn is_slower(ratios: &[f64]) -> bool {
+    quantile(ratios, 1.0 - ROUNDS) > SLOWER
+}
+
 /// Rows chosen by the plan that take clearly more time than another row of the same case for a clearly larger error: of all coordinates (RMS), of
 /// those away from silhouettes (99th percentile) or of the picture, and no smaller one of the others. A row that has the plans of one above it is that row.
 #[must_use]
@@ -100,19 +105,18 @@ pub fn violations(rows: &[Row]) -> Vec<Violation> {
     for row in rows.iter().filter(|row| row.family == Family::Tolerance) {
         for other in rows.iter().filter(|other| comparable(row, other) && other.knob != row.knob) {
             let ratios = row.times.ratios(&other.times);
-            let [least, median] = [1.0 - ROUNDS, 0.5].map(|part| quantile(&ratios, part));
             // Samples and taps do not move sources: what was not compared is as in the case's default row.
             let default = rows.iter().find(|default| comparable(row, default) && default.knob == DEFAULT);
             let coords = |figure: fn(&Row) -> Option<f64>| {
                 coords_than(figure(other).or_else(|| default.and_then(|default| figure(default))), figure(row))
             };
             let than = [coords(|row| row.coord_rms_px), coords(|row| row.smooth_p99_px), picture_than(other, row)];
-            if least > SLOWER && than.contains(&Than::Better) && !than.contains(&Than::Worse) {
+            if is_slower(&ratios) && than.contains(&Than::Better) && !than.contains(&Than::Worse) {
                 found.push(Violation {
                     case: row.case.clone(),
                     row: row.knob.clone(),
                     better: other.knob.clone(),
-                    time_ratio: median,
+                    time_ratio: quantile(&ratios, 0.5),
                     coord_rms_px: [row.coord_rms_px, other.coord_rms_px],
                     smooth_p99_px: [row.smooth_p99_px, other.smooth_p99_px],
                     psnr_db: [row.psnr_db, other.psnr_db],
