@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Silhouettes, Solver, TrackerSpec};
+use super::{
+    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec,
+};
 use crate::plan::MAX_KEYS;
 
 /// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
@@ -257,6 +259,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
     check.require(matches!(quality.key_frames, Auto::Auto | Auto::Value(0 | 1)), "quality.key_frames", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
+    check.require([1, QualitySpec::default().frames_per_ideal].contains(&quality.frames_per_ideal), "quality.frames_per_ideal", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
     check.require(quality.ideal_scale == Auto::Auto, "quality.ideal_scale", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
@@ -375,6 +380,10 @@ mod tests {
             ("quality.footprint_taps", |s| {
                 s.quality.preset = Preset::Paper;
                 s.quality.footprint_taps = Auto::Value(2);
+            }),
+            ("quality.frames_per_ideal", |s| {
+                s.quality.preset = Preset::Paper;
+                s.quality.frames_per_ideal = 16;
             }),
             ("quality.max_error_px", |s| s.quality.max_error_px = 0.0),
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(0)),
