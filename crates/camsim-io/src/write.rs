@@ -27,7 +27,7 @@ mod png_file;
 mod tables;
 
 pub use atomic::write_atomic;
-pub use encode::{luminance, srgb_from_linear};
+pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary};
 pub use picture::write_picture;
 pub use png_file::contact_sheet;
