@@ -13,5 +13,5 @@ pub struct Args {
 
 /// Opens the window and stays until it is closed.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    camsim_viewer::run(args.scenario.clone()).or_failed()
+    camsim_viewer::run(args.scenario.clone(), None).or_failed()
 }

@@ -1,0 +1,132 @@
+//! A window without a screen.
+
+use std::{
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+
+use eframe::egui;
+use egui_kittest::{
+    Harness, SnapshotOptions,
+    kittest::{NodeT, Queryable},
+};
+
+use crate::{
+    app::Viewer,
+    engine::{Size, Wanted},
+    export::Exporter,
+    settings::Settings,
+    state::State,
+};
+
+/// Longest wait for a picture: debug builds on two busy processors are slow.
+const PATIENCE: Duration = Duration::from_secs(240);
+
+/// The built-in flight.
+pub fn demo() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml")
+}
+
+/// A small flat scene with every effect, quick to render: the tests of panes need no mountains.
+pub fn pattern() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
+}
+
+/// A viewer and its window.
+pub struct Window {
+    pub harness: Harness<'static, Option<Viewer>>,
+}
+
+impl Window {
+    /// Of 1000 x 700 points, on a scenario.
+    pub fn open(scenario: Option<PathBuf>) -> Self {
+        Self::with(scenario, None, [1000.0, 700.0])
+    }
+
+    pub fn with(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2]) -> Self {
+        let mut start = Some((scenario, exporter));
+        let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
+            if let Some((scenario, exporter)) = start.take() {
+                *viewer = Some(Viewer::new(ui.ctx(), scenario, Settings::default(), exporter));
+            }
+            viewer.as_mut().expect("made in the first pass").show(ui);
+        };
+        let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
+        Self { harness: builder.wgpu().build_ui_state(show, None) }
+    }
+
+    pub fn state(&self) -> &State {
+        &self.harness.state().as_ref().expect("open").state
+    }
+
+    pub fn state_mut(&mut self) -> &mut State {
+        &mut self.harness.state_mut().as_mut().expect("open").state
+    }
+
+    pub fn step(&mut self) {
+        self.harness.step();
+    }
+
+    /// Lets the window run until something is so.
+    #[track_caller]
+    pub fn wait(&mut self, what: &str, mut is_so: impl FnMut(&State) -> bool) {
+        let begun = Instant::now();
+        while !is_so(self.state()) {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "{what}: not within {PATIENCE:?}; fault {:?}, notices {:?}",
+                self.state().heard.fault,
+                self.state().notices
+            );
+            self.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        self.step();
+    }
+
+    /// Until what is wanted is on show, in full size.
+    #[track_caller]
+    pub fn settle(&mut self) {
+        self.wait("the full picture", |state| {
+            let wanted = state.wanted();
+            wanted.as_ref().is_some_and(|wanted| wanted.size == Size::Full) && shown(state) == wanted.as_ref()
+        });
+    }
+
+    /// Until the oracle answers for what is on show.
+    #[track_caller]
+    pub fn settle_exact(&mut self) {
+        self.settle();
+        self.wait("looks", |state| state.heard.current_looks().is_some());
+    }
+
+    #[track_caller]
+    pub fn click(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        self.step();
+        self.step();
+    }
+
+    /// What a screen would show.
+    pub fn picture(&mut self) -> image::RgbaImage {
+        self.harness.render().expect("rendered")
+    }
+
+    /// Holds the window against its picture in `tests/snapshots`. Fonts and lines may differ a little between drivers.
+    #[track_caller]
+    pub fn snapshot(&mut self, name: &str) {
+        let options = SnapshotOptions::new().threshold(1.5).max_failed_pixels(200_usize);
+        self.harness.check_accessibility();
+        self.harness.snapshot_options(name, &options);
+    }
+}
+
+/// What the pictures on show were made for.
+pub fn shown(state: &State) -> Option<&Wanted> {
+    state.heard.shown.as_ref().map(|shown| &shown.reply.wanted)
+}
+
+/// Whether a node of that name is there.
+pub fn has(window: &Window, label: &str) -> bool {
+    window.harness.query_all_by_label(label).next().is_some_and(|node| !node.accesskit_node().is_hidden())
+}
