@@ -6,16 +6,6 @@ use std::{
     time::Instant,
 };
 
-use camsim_core::{
-    frame::RenderedFrame,
-    noise::tail_table,
-    plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
-    pose::CameraPose,
-    scenario::Channel,
-    scene::LodSelection,
-    sequence::Sequence,
-    temporal::IdealGeometry,
-};
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
     ideal::{IdealPass, IdealTarget},
@@ -28,6 +18,16 @@ use crate::{
     shaders::ComposeError,
     staging::Staging,
     upload::SceneBuffers,
+};
+use camsim_core::{
+    frame::RenderedFrame,
+    noise::tail_table,
+    plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
+    pose::CameraPose,
+    scenario::Channel,
+    scene::LodSelection,
+    sequence::Sequence,
+    temporal::IdealGeometry,
 };
 
 mod ahead;

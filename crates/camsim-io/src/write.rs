@@ -65,6 +65,9 @@ pub enum WriteError {
     /// The threads are gone without an error of their own.
     #[error("the writer threads ended early; run again")]
     Ended,
+    /// Somebody has asked for it.
+    #[error("stopped on request; frames that are written stay as they are")]
+    Stopped,
 }
 
 fn advice(source: &io::Error) -> &'static str {

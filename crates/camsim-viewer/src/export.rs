@@ -39,16 +39,20 @@ pub struct Progress {
 pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sync>;
 
 impl ExportJob {
+    /// A job that nobody has started.
+    pub fn new(scenario: Scenario, folder: PathBuf, frames: [u64; 2]) -> Self {
+        Self { scenario, folder, frames, cancelled: AtomicBool::new(false), progress: Mutex::default(), repaint: None }
+    }
+
     /// Starts `exporter` on its own thread.
-    pub fn start(exporter: &Exporter, scenario: Scenario, folder: PathBuf, frames: [u64; 2], context: &eframe::egui::Context) -> Arc<Self> {
-        let job = Arc::new(Self {
-            scenario,
-            folder,
-            frames,
-            cancelled: AtomicBool::new(false),
-            progress: Mutex::default(),
-            repaint: Some(context.clone()),
-        });
+    pub(crate) fn start(
+        exporter: &Exporter,
+        scenario: Scenario,
+        folder: PathBuf,
+        frames: [u64; 2],
+        context: &eframe::egui::Context,
+    ) -> Arc<Self> {
+        let job = Arc::new(Self { repaint: Some(context.clone()), ..Self::new(scenario, folder, frames) });
         let (exporter, of_thread) = (exporter.clone(), job.clone());
         let spawned = std::thread::Builder::new().name("camsim export".into()).spawn(move || {
             let run = std::panic::AssertUnwindSafe(|| exporter(&of_thread));

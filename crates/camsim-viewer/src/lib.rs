@@ -67,6 +67,8 @@ pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Res
             .with_app_id("camsim")
             .with_title("camsim"),
         renderer: eframe::Renderer::Wgpu,
+        // Pixels are shown as they are.
+        dithering: false,
         ..Default::default()
     };
     let start = move |creation: &eframe::CreationContext<'_>| {

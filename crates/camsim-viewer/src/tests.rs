@@ -1,4 +1,8 @@
 //! The whole window, headless, against the real engine on a software adapter.
 
+mod editing;
 pub mod harness;
+mod latency;
+mod pages;
 mod pictures;
+mod scrubbing;

@@ -42,7 +42,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         }
         _ => vec![pane],
     };
-    let placements: Vec<Placement> = panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view)).collect();
+    let placements: Vec<Placement> =
+        panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, 1.0 / ui.pixels_per_point())).collect();
     draw(ui, state, &placements);
     let on_wipe = state.view.compare == Compare::Wipe && placements.first().is_some_and(|placement| wipe(ui, state, placement, out));
     canvas::interact(ui, &response, &placements, state, on_wipe, out);
@@ -86,7 +87,7 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
     }
     let depth = state.heard.shown.as_ref().and_then(|shown| shown.depth.as_ref()).filter(|_| state.view.overlays.depth);
     placement.image(&painter, depth.unwrap_or(sight.texture), sight.size_px);
-    overlays::draw(&painter, placement, state, &sight);
+    overlays::draw(&painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())), placement, state, &sight);
     let corner = clip.intersect(placement.pane).left_top() + egui::vec2(6.0, 4.0);
     label(&painter, corner, &format!("{name}: {}{}", stage.label(), progress(state, &sight)));
 }

@@ -51,6 +51,10 @@ fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
         fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
         fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
         fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
+        let truth = state.heard.shown.as_ref().and_then(|shown| shown.reply.truth.as_ref());
+        if let Some(depth_m) = truth.and_then(|truth| truth.depth_m.get(at / 4)) {
+            fact(ui, "depth, rendered", format!("{depth_m:.3} m"), "as the depth channel has it; 0 = nothing there");
+        }
     });
 }
 

@@ -18,6 +18,8 @@ use crate::{
 const POINTS: u64 = 1000;
 /// Pixels of the relief along a side.
 const RELIEF_PX: usize = 128;
+/// What the camera sees farther away does not make the map larger.
+const FARTHEST_M: f64 = 5000.0;
 /// Rays along each side of the footprint.
 const SIDE_RAYS: u32 = 6;
 
@@ -98,7 +100,12 @@ fn chart(ui: &Ui, sequence: &Arc<Sequence>) -> Chart {
     let frames = (0..count).map(|k| if count > 1 { (u128::from(k) * u128::from(last) / u128::from(count - 1)) as u64 } else { 0 });
     let track: Vec<(DVec2, u64)> =
         frames.map(|frame| (sequence.path.pose(stamp_s(sequence, frame)).position_ned_m.truncate(), frame)).collect();
-    let bounds = bounds(&track);
+    let seen = (0..=4).flat_map(|k| {
+        let pose = sequence.path.pose(stamp_s(sequence, last * k / 4));
+        let here = pose.position_ned_m.truncate();
+        footprint(sequence, &pose).into_iter().flatten().map(move |ne| here + (ne - here).clamp_length_max(FARTHEST_M)).collect::<Vec<_>>()
+    });
+    let bounds = bounds(track.iter().map(|(ne, _)| *ne).chain(seen));
     let terrain = sequence.scene.terrain.as_ref();
     let relief = terrain.map(|terrain| ui.ctx().load_texture("relief", relief(terrain, bounds), TextureOptions::LINEAR));
     let chart = Chart { of, track: Arc::new(track), bounds, relief };
@@ -106,13 +113,13 @@ fn chart(ui: &Ui, sequence: &Arc<Sequence>) -> Chart {
     chart
 }
 
-/// A square with room around the track for what the camera sees.
-fn bounds(track: &[(DVec2, u64)]) -> [DVec2; 2] {
-    let (low, high) = track.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), (ne, _)| (low.min(*ne), high.max(*ne)));
+/// A square around the track and what the camera sees.
+fn bounds(points: impl Iterator<Item = DVec2>) -> [DVec2; 2] {
+    let (low, high) = points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), ne| (low.min(ne), high.max(ne)));
     if !low.is_finite() || !high.is_finite() {
         return [DVec2::splat(-1.0), DVec2::splat(1.0)];
     }
-    let half = 0.5 * (high - low).max_element().max(100.0) + 800.0;
+    let half = 0.55 * (high - low).max_element().max(100.0);
     let middle = 0.5 * (low + high);
     [middle - half, middle + half]
 }

@@ -2,6 +2,7 @@
 
 use eframe::egui;
 
+use super::widgets::named;
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -17,7 +18,10 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     }
     for (at, notice) in state.notices.iter().enumerate() {
         ui.horizontal(|ui| {
-            if ui.small_button("x").on_hover_text(format!("dismiss: {notice}")).clicked() {
+            let name = format!("dismiss: {notice}");
+            let dismiss = ui.small_button("x").on_hover_text(&name);
+            named(&dismiss, egui::Role::Button, &name);
+            if dismiss.clicked() {
                 out.push(Message::Dismiss(at));
             }
             line(ui, notice, false);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{self, Color32, Ui};
-use egui_plot::{HLine, Legend, Line, Plot, PlotPoints, VLine};
+use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, VLine};
 
 use crate::{
     message::{Message, Outbox},
@@ -39,18 +39,18 @@ fn plot(ui: &mut Ui, state: &State, channel: &Channel, cursor_s: f64, start_s: f
         .height(110.0)
         .show_x(true)
         .allow_scroll(false)
-        .legend(Legend::default())
         .link_axis(egui::Id::unique("flight time"), [true, false])
         .link_cursor(egui::Id::unique("flight time"), [true, false]);
+    let plot = if channel.lines.len() > 1 { plot.legend(Legend::default().position(Corner::LeftTop).background_alpha(0.5)) } else { plot };
     let colors = [Color32::from_rgb(150, 150, 150), Color32::from_rgb(90, 180, 250), Color32::from_rgb(250, 150, 60)];
     let shown = plot.show(ui, |ui| {
         for ((name, points), color) in channel.lines.iter().zip(colors) {
             ui.line(Line::new(*name, PlotPoints::new(points.clone())).color(color));
         }
         if let Some(limit) = channel.limit {
-            ui.hline(HLine::new("limit", limit).color(Color32::from_rgb(220, 70, 60)));
+            ui.hline(HLine::new("", limit).color(Color32::from_rgb(220, 70, 60)));
         }
-        ui.vline(VLine::new("now", cursor_s).color(Color32::WHITE));
+        ui.vline(VLine::new("", cursor_s).color(Color32::WHITE));
         ui.pointer_coordinate()
     });
     if shown.response.clicked()

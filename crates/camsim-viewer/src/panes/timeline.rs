@@ -95,6 +95,9 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
         let span = Rect::from_x_y_ranges(x_of(from).max(inner.left())..=x_of(to).min(inner.right()).max(x_of(from) + 1.0), inner.y_range());
         painter.rect_filled(span, 0.0, ui.visuals().warn_fg_color.gamma_multiply(0.6));
     });
+    for frame in repaired(state) {
+        painter.vline(x_of(frame), inner.y_range(), Stroke::new(1.0, ui.visuals().error_fg_color));
+    }
     let x = x_of(timeline.frame as f64);
     painter.vline(x, rect.y_range(), Stroke::new(2.0, ui.visuals().strong_text_color()));
     let dragged = response.is_pointer_button_down_on();
@@ -125,6 +128,14 @@ fn gaps(state: &State, mut mark: impl FnMut(f64, f64)) {
     let pairs = rows.get(from..to).unwrap_or_default().windows(2);
     let wide = pairs.filter(|pair| (pair[1].t_s - pair[0].t_s) * speed > GAP_S);
     wide.take(MOST_GAPS).for_each(|pair| mark(frame_at(pair[0].t_s), frame_at(pair[1].t_s)));
+}
+
+/// Frames at rows of the log that were repaired, the first few of each kind.
+fn repaired(state: &State) -> Vec<f64> {
+    let Some(loaded) = &state.heard.loaded else { return Vec::new() };
+    let (sequence, last) = (&loaded.sequence, state.timeline.last() as f64);
+    let frames = loaded.log.report.repaired_s.iter().map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps);
+    frames.filter(|frame| (0.0..=last).contains(frame)).collect()
 }
 
 fn log_report(ui: &mut Ui, state: &State) {

@@ -93,6 +93,13 @@ impl Window {
         });
     }
 
+    /// Stops play, then as [`Window::settle`].
+    #[track_caller]
+    pub fn settle_stopped(&mut self) {
+        self.state_mut().timeline.playing = false;
+        self.settle();
+    }
+
     /// Until the oracle answers for what is on show.
     #[track_caller]
     pub fn settle_exact(&mut self) {
@@ -103,8 +110,8 @@ impl Window {
     #[track_caller]
     pub fn click(&mut self, label: &str) {
         self.harness.get_by_label(label).click();
-        self.step();
-        self.step();
+        // Pressed, let go, done, shown.
+        (0..3).for_each(|_| self.step());
     }
 
     /// What a screen would show.
@@ -112,12 +119,25 @@ impl Window {
         self.harness.render().expect("rendered")
     }
 
-    /// Holds the window against its picture in `tests/snapshots`. Fonts and lines may differ a little between drivers.
+    /// Holds a part of the window against its picture in `tests/snapshots`: what tells times, paths or noise is left out. Fonts and lines may
+    /// differ a little between drivers.
     #[track_caller]
-    pub fn snapshot(&mut self, name: &str) {
-        let options = SnapshotOptions::new().threshold(1.5).max_failed_pixels(200_usize);
+    pub fn snapshot(&mut self, name: &str, part: egui::Rect) {
         self.harness.check_accessibility();
-        self.harness.snapshot_options(name, &options);
+        let whole = self.picture();
+        let [x, y, width, height] = [part.left(), part.top(), part.width(), part.height()].map(|v| v.max(0.0).round() as u32);
+        let part = image::imageops::crop_imm(&whole, x, y, width, height).to_image();
+        let options = SnapshotOptions::new().threshold(1.5).max_failed_pixels(200_usize);
+        egui_kittest::image_snapshot_options(&part, name, &options);
+    }
+
+    /// The panel on the right, below its tabs.
+    pub fn page(&self) -> egui::Rect {
+        let tabs = self.harness.get_by_label("Export").rect();
+        egui::Rect::from_min_max(
+            egui::pos2(self.harness.get_by_label("picture").rect().right() + 12.0, tabs.bottom() + 6.0),
+            egui::pos2(984.0, 590.0),
+        )
     }
 }
 

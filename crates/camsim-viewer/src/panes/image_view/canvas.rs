@@ -25,8 +25,8 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// As the view says.
-    pub fn new(pane: Rect, size_px: [u32; 2], view: &View) -> Self {
+    /// As the view says; `points_per_pixel` of the screen.
+    pub fn new(pane: Rect, size_px: [u32; 2], view: &View, points_per_pixel: f32) -> Self {
         let size = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
         let fit = (pane.width() / size.x).min(pane.height() / size.y).max(1e-4);
         let (scale, centre) = match view.zoom {
@@ -34,6 +34,9 @@ impl Placement {
             None => (fit, [0.5, 0.5]),
         };
         let origin = pane.center() - vec2(centre[0] * size.x, centre[1] * size.y) * scale;
+        // On a border of the screen's own pixels: at one of them a pixel, each then shows just one.
+        let snap = |at: f32| (at / points_per_pixel).round() * points_per_pixel;
+        let origin = pos2(snap(origin.x), snap(origin.y));
         Self { pane, size_px, scale, origin }
     }
 
@@ -133,7 +136,7 @@ mod tests {
 
     #[test]
     fn pixels_and_points_agree() {
-        let placement = Placement::new(pane(), [64, 48], &View::default());
+        let placement = Placement::new(pane(), [64, 48], &View::default(), 1.0);
         assert_eq!(placement.scale, 10.0);
         assert_eq!(placement.pixel(pos2(100.0, 50.0)), Some([0, 0]));
         assert_eq!(placement.pixel(pos2(739.9, 529.9)), Some([63, 47]));
@@ -146,20 +149,20 @@ mod tests {
         let mut view = View::default();
         let at = pos2(300.0, 200.0);
         for factor in [1.5, 3.0, 0.4] {
-            let before = Placement::new(pane(), [64, 48], &view);
+            let before = Placement::new(pane(), [64, 48], &view, 1e-3);
             let share = before.share(at);
             view = zoomed(&view, &before, at, factor);
-            let after = Placement::new(pane(), [64, 48], &view).share(at);
+            let after = Placement::new(pane(), [64, 48], &view, 1e-3).share(at);
             assert!((share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4, "{share:?} {after:?}");
         }
     }
 
     #[test]
     fn a_preview_lies_on_the_picture() {
-        let placement = Placement::new(pane(), [640, 480], &View::default());
+        let placement = Placement::new(pane(), [640, 480], &View::default(), 1.0);
         assert_eq!(placement.picture_rect([320, 240]), placement.rect());
         // 639 pixels are 320 of two: half a pixel of the preview lies outside.
-        let odd = Placement::new(pane(), [639, 480], &View::default());
+        let odd = Placement::new(pane(), [639, 480], &View::default(), 1.0);
         assert!((odd.picture_rect([320, 240]).width() - 640.0 * odd.scale).abs() < 1e-3);
     }
 }
