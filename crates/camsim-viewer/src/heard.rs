@@ -81,10 +81,12 @@ impl Heard {
             Reply::Looks(looks) => self.looks = Some(looks),
             Reply::Failed(fault) => self.fault = Some(fault),
             Reply::Frame(reply) => {
-                let ms = 1e3 * reply.took.as_secs_f64();
-                match reply.wanted.size {
-                    Size::Full => self.full_ms = Some(ms),
-                    Size::Preview => self.preview_ms = Some(ms),
+                if let Some(took) = reply.took {
+                    let of_size = match reply.wanted.size {
+                        Size::Full => &mut self.full_ms,
+                        Size::Preview => &mut self.preview_ms,
+                    };
+                    *of_size = Some(1e3 * took.as_secs_f64());
                 }
                 self.fault = None;
                 self.shown = Some(Shown::new(*reply, self.shown.take(), context));

@@ -130,8 +130,8 @@ pub struct FrameReply {
     pub truth: Option<Arc<Truth>>,
     /// The difference of the two pictures, if wanted.
     pub difference: Option<Arc<Difference>>,
-    /// From taking up the request to this reply.
-    pub took: Duration,
+    /// From taking up the request to this reply; `None` if all of it was there already.
+    pub took: Option<Duration>,
 }
 
 /// A picture of the oracle as far as it has come.

@@ -56,7 +56,7 @@ pub fn run(mailbox: &Mailbox<Wanted>, speaker: &Speaker) {
             }
         };
         speaker.say(Reply::Adapter(engine.gpu().adapter.to_string()));
-        let mut worker = Worker { engine: &engine, speaker, loaded: None, session: None, kept: Vec::new() };
+        let mut worker = Worker { engine: &engine, speaker, loaded: None, session: None, kept: Vec::new(), rendered: 0 };
         loop {
             let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
             if let Err(fault) = worker.serve(&wanted, mailbox) {
@@ -90,11 +90,13 @@ struct Worker<'a> {
     loaded: Option<Known>,
     session: Option<Session<'a>>,
     kept: Vec<Kept>,
+    /// Frames rendered so far.
+    rendered: u64,
 }
 
 impl Worker<'_> {
     fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
-        let begun = Instant::now();
+        let (begun, before) = (Instant::now(), self.rendered);
         let loaded = self.load(wanted)?;
         let sequence = &loaded.sequence;
         let frame = wanted.frame.min(sequence.frames.saturating_sub(1));
@@ -111,7 +113,8 @@ impl Worker<'_> {
             (Some(gain), [a, b]) => difference(a.frame.size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain).map(Arc::new),
             _ => None,
         };
-        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, difference, took: begun.elapsed() };
+        let took = (self.rendered > before).then(|| begun.elapsed());
+        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, difference, took };
         self.speaker.say(Reply::Frame(Box::new(reply)));
         Ok(())
     }
@@ -189,6 +192,7 @@ impl Worker<'_> {
             Ok(())
         };
         session.render::<Infallible>([frame], &mut keep)?;
+        self.rendered += 1;
         done.ok_or(Fault::Missing(frame))
     }
 }

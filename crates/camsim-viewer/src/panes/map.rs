@@ -26,13 +26,16 @@ const SIDE_RAYS: u32 = 6;
 /// What is drawn from frame to frame, found once a sequence.
 #[derive(Clone)]
 struct Chart {
-    of: usize,
-    /// North and east, metres, with the frame.
-    track: Arc<Vec<(DVec2, u64)>>,
+    of: Key,
+    /// North and east, metres, with the time after the first frame, seconds.
+    track: Arc<Vec<(DVec2, f64)>>,
     /// South-west and north-east corner.
     bounds: [DVec2; 2],
     relief: Option<TextureHandle>,
 }
+
+/// What it depends on: not on the camera, so that a dragged parameter does not draw it anew.
+type Key = (usize, usize, u64, u64);
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -73,9 +76,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let place = pose.position_ned_m;
     ui.label(format!("camera at {:.1} m north, {:.1} m east, {:.1} m down", place.x, place.y, place.z));
     if let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked())
-        && let Some(frame) = nearest(&chart, |ne| screen(ne).distance_sq(at))
+        && let Some(after_s) = nearest(&chart, |ne| screen(ne).distance_sq(at))
     {
-        out.push(Message::Seek(frame));
+        out.push(Message::Seek(state.timeline.frame_at(after_s)));
     }
 }
 
@@ -84,22 +87,30 @@ fn stamp_s(sequence: &Sequence, frame: u64) -> f64 {
     sequence.start_s + (frame as f64 + camera.phase) / camera.fps
 }
 
-/// The frame whose point of the track is nearest.
-fn nearest(chart: &Chart, distance: impl Fn(DVec2) -> f32) -> Option<u64> {
-    chart.track.iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))).map(|(_, frame)| *frame)
+/// The time of the nearest point of the track.
+fn nearest(chart: &Chart, distance: impl Fn(DVec2) -> f32) -> Option<f64> {
+    chart.track.iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))).map(|(_, after_s)| *after_s)
 }
 
 fn chart(ui: &Ui, sequence: &Arc<Sequence>) -> Chart {
     let id = eframe::egui::Id::unique("map chart");
-    let of = Arc::as_ptr(sequence) as usize;
+    let of = (
+        Arc::as_ptr(&sequence.scene) as usize,
+        Arc::as_ptr(&sequence.path.trajectory) as usize,
+        sequence.start_s.to_bits(),
+        (sequence.frames as f64 / sequence.scenario.camera.fps).to_bits(),
+    );
     if let Some(chart) = ui.data(|data| data.get_temp::<Chart>(id)).filter(|chart| chart.of == of) {
         return chart;
     }
     let last = sequence.frames.saturating_sub(1);
     let count = POINTS.min(last + 1).max(1);
     let frames = (0..count).map(|k| if count > 1 { (u128::from(k) * u128::from(last) / u128::from(count - 1)) as u64 } else { 0 });
-    let track: Vec<(DVec2, u64)> =
-        frames.map(|frame| (sequence.path.pose(stamp_s(sequence, frame)).position_ned_m.truncate(), frame)).collect();
+    let track: Vec<(DVec2, f64)> = frames
+        .map(|frame| {
+            (sequence.path.pose(stamp_s(sequence, frame)).position_ned_m.truncate(), stamp_s(sequence, frame) - stamp_s(sequence, 0))
+        })
+        .collect();
     let seen = (0..=4).flat_map(|k| {
         let pose = sequence.path.pose(stamp_s(sequence, last * k / 4));
         let here = pose.position_ned_m.truncate();

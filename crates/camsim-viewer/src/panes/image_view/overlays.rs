@@ -9,6 +9,8 @@ use crate::{engine::Stage, heard::Sight, motion, panes::ramp_color, state::State
 
 /// Times that the predicted error is enlarged.
 const ERROR_SCALE: f64 = 200.0;
+/// Times that ways are enlarged: most are of a pixel.
+const MOTION_SCALE: f64 = 8.0;
 /// Circles of the predicted error across the picture.
 const CIRCLES: [u32; 2] = [12, 9];
 /// Lines of the distortion grid over the picture's width, and points of each.
@@ -82,7 +84,10 @@ fn motion_paths(painter: &Painter, placement: &Placement, state: &State) {
     let paths = motion::paths(looks, shown.reply.frame);
     let (of_shift, of_blur) = (Stroke::new(1.0, Color32::from_rgb(80, 200, 255)), Stroke::new(2.0, Color32::from_rgb(255, 120, 60)));
     for path in paths.iter() {
-        let screen = |place: DVec2| placement.screen(place.x, place.y);
+        let screen = |place: DVec2| {
+            let place = path.pixel + MOTION_SCALE * (place - path.pixel);
+            placement.screen(place.x, place.y)
+        };
         if let Some(at_stamp) = path.at_stamp_px {
             painter.line_segment([screen(at_stamp), screen(path.pixel)], of_shift);
         }
@@ -106,7 +111,8 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
         painter.rect_filled(eframe::egui::Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
     }
     for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
-        let at = pos2(left + 13.0, placement.screen(0.0, f64::from(y)).y);
+        let seen = placement.rect().intersect(placement.pane).shrink(7.0);
+        let at = pos2(left + 13.0, placement.screen(0.0, f64::from(y)).y.clamp(seen.top(), seen.bottom().max(seen.top())));
         let text = format!("{:+.2} ms", 1e3 * mids.get(y as usize).copied().unwrap_or_default());
         painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(11.0), Color32::WHITE);
     }

@@ -76,7 +76,7 @@ fn overlays(ui: &mut Ui, view: &mut View) {
         .on_hover_text("pixels without a ray, or outside of every ideal frame, in the paper's red (I)");
     ui.toggle_value(&mut over.grid, "grid").on_hover_text("lines of equal ideal ray: what the lens does to a square grid (G)");
     ui.toggle_value(&mut over.motion, "motion").on_hover_text(
-        "from where each place would be at the stamp to where it is at its row's time (eq. 16), and its way over the exposure (M)",
+        "8 times as large: from where each place would be at the stamp to where it is at its row's time (eq. 16, blue), and its way over the exposure (orange) (M)",
     );
     ui.toggle_value(&mut over.rows, "row times").on_hover_text("mid-exposure of each row after the stamp");
     ui.toggle_value(&mut over.error, "predicted error")
