@@ -53,6 +53,9 @@ pub use export::{ExportJob, Exporter, Progress};
 /// # Errors
 /// No display, or nothing that a window can be drawn with. What is wrong with a scenario, or on the way, is shown in the window.
 pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Result<()> {
+    if let Some(text) = no_display() {
+        return Err(anyhow!(text));
+    }
     let path = match scenario {
         Some(path) => path,
         None => {
@@ -81,4 +84,14 @@ pub fn run(scenario: Option<PathBuf>, exporter: Option<Exporter>) -> anyhow::Res
              DirectX 12 adapter (`camsim info` lists them)"
         )
     })
+}
+
+/// On systems whose windows are another program's: what to do where that is not there.
+fn no_display() -> Option<&'static str> {
+    let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let needed = cfg!(all(unix, not(target_os = "macos")));
+    (needed && !["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"].into_iter().any(is_set)).then_some(
+        "the viewer needs a display, and neither WAYLAND_DISPLAY nor DISPLAY is set: open it from a desktop session, over `ssh -X`, or in `xvfb-run`; \
+         `camsim render` needs none",
+    )
 }

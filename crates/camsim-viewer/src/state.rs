@@ -164,10 +164,8 @@ impl State {
             Message::Tab(tab) => self.view.tab = tab,
             Message::Hover(pixel) => self.hovered = pixel,
             Message::Pin(pixel) => self.pinned = pixel,
-            Message::Dismiss(at) => {
-                if at < self.notices.len() {
-                    self.notices.remove(at);
-                }
+            Message::Dismiss(at) if at < self.notices.len() => {
+                self.notices.remove(at);
             }
             Message::Help(open) => self.help = open,
             Message::Ask(question) => self.question = question,

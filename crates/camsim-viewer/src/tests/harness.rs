@@ -2,6 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
+    sync::mpsc::{Receiver, channel},
     time::{Duration, Instant},
 };
 
@@ -35,6 +36,8 @@ pub fn pattern() -> PathBuf {
 /// A viewer and its window.
 pub struct Window {
     pub harness: Harness<'static, Option<Viewer>>,
+    /// A word for each repaint that is asked for: by the engine with each reply.
+    repaints: Receiver<()>,
 }
 
 impl Window {
@@ -52,7 +55,13 @@ impl Window {
             viewer.as_mut().expect("made in the first pass").show(ui);
         };
         let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
-        Self { harness: builder.wgpu().build_ui_state(show, None) }
+        let harness = builder.wgpu().build_ui_state(show, None);
+        let (sender, repaints) = channel();
+        harness.ctx.set_request_repaint_callback(move |_| {
+            // The window may be gone.
+            let _ = sender.send(());
+        });
+        Self { harness, repaints }
     }
 
     pub fn state(&self) -> &State {
@@ -79,7 +88,8 @@ impl Window {
                 self.state().notices
             );
             self.step();
-            std::thread::sleep(Duration::from_millis(5));
+            // Time goes on by the steps, too: that a hand rests is not told by a repaint.
+            let _ = self.repaints.recv_timeout(Duration::from_millis(5));
         }
         self.step();
     }

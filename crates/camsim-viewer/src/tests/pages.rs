@@ -1,6 +1,6 @@
 //! The pages on the right, the shortcuts, and windows in odd states.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, mpsc::channel};
 
 use camsim_core::{camera::CameraModel, shutter::Shutter};
 use eframe::egui::{self, Key};
@@ -80,9 +80,12 @@ fn plan_plots_map_and_export_have_what_they_should() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn an_export_shows_progress_and_can_be_cancelled() {
-    let exporter: crate::Exporter = Arc::new(|job| {
+    // Renders a frame for each word.
+    let (word, words) = channel::<()>();
+    let words = Mutex::new(words);
+    let exporter: crate::Exporter = Arc::new(move |job| {
         for _ in job.frames[0]..job.frames[1] {
-            std::thread::sleep(std::time::Duration::from_millis(5));
+            let _ = words.lock().expect("one export at a time").recv();
             if !job.tick() {
                 return Err("stopped on request".into());
             }
@@ -93,8 +96,10 @@ fn an_export_shows_progress_and_can_be_cancelled() {
     window.settle();
     window.click("Export");
     window.click("Render");
-    window.wait("progress", |state| state.export.as_ref().is_some_and(|job| job.progress().done > 2));
+    (0..3).for_each(|_| word.send(()).expect("the exporter listens"));
+    window.wait("progress", |state| state.export.as_ref().is_some_and(|job| job.progress().done == 3));
     window.click("Cancel");
+    drop(word);
     window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
     assert!(has(&window, "stopped on request"));
     window.click("Render");

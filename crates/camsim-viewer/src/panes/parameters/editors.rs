@@ -205,7 +205,7 @@ fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option
         }
     });
     named(&combo.response, Role::ComboBox, key);
-    (chosen != before).then(|| Value::String(chosen)).and_then(once)
+    (chosen != before).then_some(Value::String(chosen)).and_then(once)
 }
 
 fn several(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
