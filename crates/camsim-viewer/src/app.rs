@@ -1,11 +1,16 @@
 //! The window: panes around a picture, wishes to the state, requests to the engine.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::{Arc, Weak},
+    time::Duration,
+};
 
+use camsim_core::sequence::Sequence;
 use eframe::egui;
 
 use crate::{
-    engine::{Handle, Wanted},
+    engine::{ExactWanted, Handle, Picture, Wanted},
     export::Exporter,
     message::{Message, Outbox},
     panes,
@@ -29,11 +34,27 @@ pub struct Viewer {
 }
 
 /// A request to the oracle by what tells it from others.
-#[derive(Debug, PartialEq)]
+#[derive(Debug)]
 struct ExactKey {
-    sequence: usize,
+    sequence: Weak<Sequence>,
     frame: Option<u64>,
-    against: Option<(usize, u32)>,
+    against: Option<(Weak<Picture>, f32)>,
+}
+
+impl ExactKey {
+    fn of(wanted: &ExactWanted) -> Self {
+        let against = wanted.against.as_ref().map(|(picture, gain)| (Arc::downgrade(picture), *gain));
+        Self { sequence: Arc::downgrade(&wanted.sequence), frame: wanted.frame, against }
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        let same_against = match (&self.against, &other.against) {
+            (Some((a, gain)), Some((b, other))) => a.ptr_eq(b) && gain.to_bits() == other.to_bits(),
+            (None, None) => true,
+            _ => false,
+        };
+        same_against && self.sequence.ptr_eq(&other.sequence) && self.frame == other.frame
+    }
 }
 
 impl Viewer {
@@ -83,12 +104,8 @@ impl Viewer {
         }
         self.asked = wanted;
         let Some(exact) = self.state.wanted_exact() else { return };
-        let key = ExactKey {
-            sequence: Arc::as_ptr(&exact.sequence) as usize,
-            frame: exact.frame,
-            against: exact.against.as_ref().map(|(picture, gain)| (Arc::as_ptr(picture) as usize, gain.to_bits())),
-        };
-        if self.asked_exact.as_ref() != Some(&key) {
+        let key = ExactKey::of(&exact);
+        if !self.asked_exact.as_ref().is_some_and(|asked| asked.is(&key)) {
             self.engine.want_exact(exact);
             self.asked_exact = Some(key);
         }

@@ -1,10 +1,12 @@
 //! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks with them.
 //!
 //! The window never waits. What it wants stands in a [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a
-//! channel, and a repaint is asked for with each. The engine has a device of its own: egui's queue is never behind a frame's work, and
-//! finished pictures cross by way of the host, as `camsim render` reads them.
+//! channel, and a repaint is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a device has
+//! one queue, in order, and a hand that moves on must not wait for a full frame, nor the window for either. Finished pictures cross by way of
+//! the host, as `camsim render` reads them. What is loaded is shared.
 
 mod exact;
+mod library;
 mod mailbox;
 mod messages;
 mod picture;
@@ -19,6 +21,7 @@ use std::{
     },
 };
 
+use library::Library;
 pub use mailbox::Mailbox;
 pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Wanted};
 pub use picture::{Difference, Picture, ramp};
@@ -27,7 +30,8 @@ pub use variants::{preview_factor, staged};
 /// The engine's threads as the window sees them. Dropping it ends them after what they are at.
 #[derive(Debug)]
 pub struct Handle {
-    wanted: Arc<Mailbox<Wanted>>,
+    previews: Arc<Mailbox<Wanted>>,
+    frames: Arc<Mailbox<Wanted>>,
     exact: Arc<Mailbox<ExactWanted>>,
     replies: Receiver<Reply>,
 }
@@ -58,17 +62,26 @@ impl Handle {
     pub fn start(repaint: impl Fn() + Send + Sync + 'static) -> Self {
         let (sender, replies) = channel();
         let speaker = Speaker { replies: sender, repaint: Arc::new(repaint) };
-        let (wanted, exact) = (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
-        let (mailbox, voice) = (wanted.clone(), speaker.clone());
-        spawn("camsim engine", speaker.clone(), move || worker::run(&mailbox, &voice));
+        let (previews, frames, exact) = (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
+        let library = Arc::new(Library::default());
+        for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &frames)] {
+            let (mailbox, library, voice) = (mailbox.clone(), library.clone(), speaker.clone());
+            spawn(name, speaker.clone(), move || worker::run(&mailbox, &library, &voice));
+        }
         let (mailbox, voice) = (exact.clone(), speaker.clone());
         spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice));
-        Self { wanted, exact, replies }
+        Self { previews, frames, exact, replies }
     }
 
     /// Replaces what is wanted of the renderer.
     pub fn want(&self, wanted: Wanted) {
-        self.wanted.put(wanted);
+        match wanted.size {
+            Size::Preview => {
+                self.frames.clear();
+                self.previews.put(wanted);
+            }
+            Size::Full => self.frames.put(wanted),
+        }
     }
 
     /// Replaces what is wanted of the oracle.
@@ -84,7 +97,8 @@ impl Handle {
 
 impl Drop for Handle {
     fn drop(&mut self) {
-        self.wanted.close();
+        self.previews.close();
+        self.frames.close();
         self.exact.close();
     }
 }

@@ -1,6 +1,6 @@
 //! Where points of the scene are in a frame at other instants than their pixel's own.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use camsim_core::{
     camera::CameraModel,
@@ -27,11 +27,10 @@ pub struct PixelPath {
 
 /// Ways of pixels all over a frame. The last answer is kept: panes ask anew with each pass.
 pub fn paths(looks: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
-    type Kept = Option<(usize, u64, Arc<Vec<PixelPath>>)>;
+    type Kept = Option<(Weak<Oracle>, u64, Arc<Vec<PixelPath>>)>;
     static KEPT: Mutex<Kept> = Mutex::new(None);
-    let key = Arc::as_ptr(looks) as usize;
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, _, paths)) = kept.as_ref().filter(|(of, at, _)| (*of, *at) == (key, frame)) {
+    if let Some((_, _, paths)) = kept.as_ref().filter(|(of, at, _)| *at == frame && std::ptr::eq(of.as_ptr(), Arc::as_ptr(looks))) {
         return paths.clone();
     }
     let [width, height] = looks.sequence().scenario.camera.size_px;
@@ -40,7 +39,7 @@ pub fn paths(looks: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
     let found: Vec<PixelPath> =
         pixels.filter_map(|[x, y]| path(looks, frame, [place(x, ACROSS[0], width), place(y, ACROSS[1], height)])).collect();
     let found = Arc::new(found);
-    *kept = Some((key, frame, found.clone()));
+    *kept = Some((Arc::downgrade(looks), frame, found.clone()));
     found
 }
 

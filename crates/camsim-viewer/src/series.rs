@@ -1,6 +1,6 @@
 //! Numbers over the flight, for plots.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use camsim_io::load::Loaded;
 use glam::{DQuat, EulerRot};
@@ -11,7 +11,7 @@ const POINTS: u64 = 800;
 /// What is plotted, over path time.
 #[derive(Clone, Debug)]
 pub struct Series {
-    of: usize,
+    of: Weak<Loaded>,
     /// Path time of the window's beginning.
     pub start_s: f64,
     /// One plot each.
@@ -65,12 +65,12 @@ impl Series {
         let image_speed = |t_s: f64| image_speed_px_s(loaded, focal_px, t_s);
         plain("blur in the middle, px", over(&|t_s| image_speed(t_s) * exposure_s), None);
         plain("row skew in the middle, px", over(&|t_s| image_speed(t_s) * readout_s), None);
-        Self { of: Arc::as_ptr(loaded) as usize, start_s: sequence.start_s, channels }
+        Self { of: Arc::downgrade(loaded), start_s: sequence.start_s, channels }
     }
 
     /// Whether it is of this.
     pub fn is_of(&self, loaded: &Arc<Loaded>) -> bool {
-        self.of == Arc::as_ptr(loaded) as usize
+        std::ptr::eq(self.of.as_ptr(), Arc::as_ptr(loaded))
     }
 }
 

@@ -107,9 +107,27 @@ impl State {
 
     /// Takes in what the engine said.
     pub fn hear(&mut self, reply: Reply, context: &egui::Context) {
+        if self.is_out_of_date(&reply) {
+            return;
+        }
         self.heard.take(reply, context);
         if let Some(sequence) = self.heard.sequence() {
             self.timeline.fit(sequence.frames, sequence.scenario.camera.fps);
+        }
+    }
+
+    /// Previews and full frames come from two threads: what the hand has left behind must not take the place of what it is at.
+    fn is_out_of_date(&self, reply: &Reply) -> bool {
+        match reply {
+            Reply::Loaded(loaded) => self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario),
+            Reply::Frame(reply) => {
+                let (Some(wanted), Some(shown)) = (self.wanted(), &self.heard.shown) else { return false };
+                match reply.wanted.size {
+                    Size::Full => wanted.size == Size::Preview && Wanted { size: Size::Full, ..wanted } != reply.wanted,
+                    Size::Preview => shown.reply.wanted == wanted,
+                }
+            }
+            _ => false,
         }
     }
 
@@ -153,11 +171,12 @@ impl State {
         match message {
             Message::Seek(frame) => {
                 self.timeline.seek(frame);
-                if self.timeline.dragged {
-                    self.touch();
-                }
+                self.touch();
             }
-            Message::Step(by) => self.timeline.step(by),
+            Message::Step(by) => {
+                self.timeline.step(by);
+                self.touch();
+            }
             Message::TogglePlay => self.timeline.toggle(),
             Message::Timeline(timeline) => self.timeline = timeline,
             Message::View(view) => self.view = view,

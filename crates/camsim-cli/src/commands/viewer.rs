@@ -59,7 +59,12 @@ mod tests {
     use super::*;
 
     fn small() -> camsim_core::scenario::Scenario {
-        let sets = [("camera.size_px", "[64, 48]"), ("camera.focal_px", "[50.0, 50.0]"), ("output.format", "[\"png\"]")];
+        let sets = [
+            ("camera.size_px", "[64, 48]"),
+            ("camera.focal_px", "[50.0, 50.0]"),
+            ("camera.principal_point_px", "[31.5, 23.5]"),
+            ("output.format", "[\"png\"]"),
+        ];
         let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
         read_scenario(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None).expect("legal")
     }

@@ -28,6 +28,11 @@ impl<T> Mailbox<T> {
         self.arrived.notify_one();
     }
 
+    /// Takes a letter back that nobody has taken.
+    pub fn clear(&self) {
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner).letter = None;
+    }
+
     /// Waits for a letter; `None` once the box is closed.
     pub fn take(&self) -> Option<T> {
         let mut slot = self.slot.lock().unwrap_or_else(PoisonError::into_inner);
@@ -67,6 +72,9 @@ mod tests {
         mailbox.put(2);
         assert!(mailbox.is_newer());
         assert_eq!(mailbox.take(), Some(2));
+        assert!(!mailbox.is_newer());
+        mailbox.put(7);
+        mailbox.clear();
         assert!(!mailbox.is_newer());
         mailbox.put(3);
         mailbox.close();

@@ -1,4 +1,4 @@
-//! The thread that loads scenarios and renders pictures of them.
+//! A thread that renders pictures.
 
 use std::{convert::Infallible, sync::Arc, time::Instant};
 
@@ -7,10 +7,11 @@ use camsim_gpu::{
     AdapterChoice, Engine, GpuError, RenderError,
     engine::{Finished, Session},
 };
-use camsim_io::load::{LoadError, Loaded, load_sequence, reload_sequence};
+use camsim_io::load::LoadError;
 
 use super::{
     Speaker,
+    library::Library,
     mailbox::Mailbox,
     messages::{FrameReply, Reply, Size, Stage, Truth, Wanted},
     picture::{Picture, depth_image, difference, screen},
@@ -41,7 +42,7 @@ impl Fault {
 }
 
 /// Serves requests until the box is closed; opens the device anew after a loss, and tries again with each request where there is none.
-pub fn run(mailbox: &Mailbox<Wanted>, speaker: &Speaker) {
+pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
     let mut waiting = None;
     loop {
         let engine = match Engine::new(AdapterChoice::Best) {
@@ -56,7 +57,7 @@ pub fn run(mailbox: &Mailbox<Wanted>, speaker: &Speaker) {
             }
         };
         speaker.say(Reply::Adapter(engine.gpu().adapter.to_string()));
-        let mut worker = Worker { engine: &engine, speaker, loaded: None, session: None, kept: Vec::new(), rendered: 0 };
+        let mut worker = Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
         loop {
             let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
             if let Err(fault) = worker.serve(&wanted, mailbox) {
@@ -70,12 +71,6 @@ pub fn run(mailbox: &Mailbox<Wanted>, speaker: &Speaker) {
     }
 }
 
-/// What is loaded, and by which request.
-struct Known {
-    reading: u64,
-    loaded: Arc<Loaded>,
-}
-
 /// A picture that was made.
 struct Kept {
     sequence: Arc<Sequence>,
@@ -87,7 +82,7 @@ struct Kept {
 struct Worker<'a> {
     engine: &'a Engine,
     speaker: &'a Speaker,
-    loaded: Option<Known>,
+    library: &'a Library,
     session: Option<Session<'a>>,
     kept: Vec<Kept>,
     /// Frames rendered so far.
@@ -97,7 +92,7 @@ struct Worker<'a> {
 impl Worker<'_> {
     fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
         let (begun, before) = (Instant::now(), self.rendered);
-        let loaded = self.load(wanted)?;
+        let loaded = self.library.load(wanted, self.speaker)?;
         let sequence = &loaded.sequence;
         let frame = wanted.frame.min(sequence.frames.saturating_sub(1));
         let mut pictures = Vec::new();
@@ -117,30 +112,6 @@ impl Worker<'_> {
         let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, difference, took };
         self.speaker.say(Reply::Frame(Box::new(reply)));
         Ok(())
-    }
-
-    /// The files of the scenario, as far as they are not known.
-    fn load(&mut self, wanted: &Wanted) -> Result<Arc<Loaded>, Fault> {
-        let same_files = self.loaded.as_ref().filter(|known| known.reading == wanted.reading);
-        if let Some(known) = same_files
-            && known.loaded.sequence.scenario == *wanted.scenario
-        {
-            return Ok(known.loaded.clone());
-        }
-        let loaded = match same_files {
-            Some(known) => reload_sequence(&wanted.scenario, &known.loaded)?,
-            None => {
-                self.speaker.say(Reply::Busy(format!("reading {}", wanted.scenario.flight.log.display())));
-                load_sequence(&wanted.scenario)?
-            }
-        };
-        if same_files.is_none() {
-            self.speaker.say(Reply::Busy(String::new()));
-        }
-        let loaded = Arc::new(loaded);
-        self.loaded = Some(Known { reading: wanted.reading, loaded: loaded.clone() });
-        self.speaker.say(Reply::Loaded(loaded.clone()));
-        Ok(loaded)
     }
 
     fn picture(&mut self, sequence: &Arc<Sequence>, stage: Stage, size: Size, frame: u64) -> Result<Arc<Picture>, Fault> {

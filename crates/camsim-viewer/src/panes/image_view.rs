@@ -112,11 +112,11 @@ fn difference(ui: &Ui, state: &State, placement: &Placement) {
     let Some((difference, texture)) = state.heard.difference(view.wants_oracle()) else {
         return label(&painter, corner, &format!("{pair}: on its way"));
     };
-    // The oracle is always held against the second picture's other side, so that the sign may have to be told.
     let size_px = difference.image.size.map(|side| side as u32);
     placement.image(&painter, texture, size_px);
     let one_sided =
         if difference.one_sided > 0.0 { format!(", {:.2} % valid in one alone", 100.0 * difference.one_sided) } else { String::new() };
+    // The oracle is always what is taken away.
     let pair = if view.a == Stage::Oracle { format!("{} - oracle", view.b.label()) } else { pair };
     label(
         &painter,

@@ -59,7 +59,7 @@ fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
 }
 
 fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan>) {
-    let (Some(shown), Some(sequence)) = (&state.heard.shown, state.heard.sequence()) else { return };
+    let Some(shown) = &state.heard.shown else { return };
     ui.separator();
     ui.strong("by exact rays");
     let Some(looks) = state.heard.current_looks() else {
@@ -96,7 +96,6 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
     if let Some(plan) = plan {
         certainty(ui, plan);
     }
-    let _ = sequence;
 }
 
 fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {

@@ -1,8 +1,14 @@
 //! The flight from above: track, terrain, where the camera is and what it sees of the ground. A click jumps to the nearest frame.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
-use camsim_core::{camera::CameraModel, pose::CameraPose, scene::Terrain, sequence::Sequence};
+use camsim_core::{
+    camera::CameraModel,
+    pose::CameraPose,
+    scene::{Scene, Terrain},
+    sequence::Sequence,
+    trajectory::Trajectory,
+};
 use eframe::egui::{
     Color32, ColorImage, Pos2, Rect, Role, Sense, Shape, Stroke, TextureHandle, TextureOptions, Ui, WidgetInfo, pos2, vec2,
 };
@@ -35,7 +41,30 @@ struct Chart {
 }
 
 /// What it depends on: not on the camera, so that a dragged parameter does not draw it anew.
-type Key = (usize, usize, u64, u64);
+#[derive(Clone)]
+struct Key {
+    scene: Weak<Scene>,
+    trajectory: Weak<Trajectory>,
+    start_s: f64,
+    seconds: f64,
+}
+
+impl Key {
+    fn of(sequence: &Sequence) -> Self {
+        Self {
+            scene: Arc::downgrade(&sequence.scene),
+            trajectory: Arc::downgrade(&sequence.path.trajectory),
+            start_s: sequence.start_s,
+            seconds: sequence.frames as f64 / sequence.scenario.camera.fps,
+        }
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        self.scene.ptr_eq(&other.scene)
+            && self.trajectory.ptr_eq(&other.trajectory)
+            && (self.start_s, self.seconds) == (other.start_s, other.seconds)
+    }
+}
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -94,13 +123,8 @@ fn nearest(chart: &Chart, distance: impl Fn(DVec2) -> f32) -> Option<f64> {
 
 fn chart(ui: &Ui, sequence: &Arc<Sequence>) -> Chart {
     let id = eframe::egui::Id::unique("map chart");
-    let of = (
-        Arc::as_ptr(&sequence.scene) as usize,
-        Arc::as_ptr(&sequence.path.trajectory) as usize,
-        sequence.start_s.to_bits(),
-        (sequence.frames as f64 / sequence.scenario.camera.fps).to_bits(),
-    );
-    if let Some(chart) = ui.data(|data| data.get_temp::<Chart>(id)).filter(|chart| chart.of == of) {
+    let of = Key::of(sequence);
+    if let Some(chart) = ui.data(|data| data.get_temp::<Chart>(id)).filter(|chart| chart.of.is(&of)) {
         return chart;
     }
     let last = sequence.frames.saturating_sub(1);
