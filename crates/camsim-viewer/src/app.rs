@@ -14,6 +14,7 @@ use crate::{
     export::Exporter,
     message::{Message, Outbox},
     panes,
+    pulse::Pulse,
     settings::Settings,
     state::State,
 };
@@ -31,6 +32,7 @@ pub struct Viewer {
     asked: Option<Wanted>,
     /// What the oracle was asked for, to ask once.
     asked_exact: Option<ExactKey>,
+    pulse: Option<Pulse>,
 }
 
 /// A request to the oracle by what tells it from others.
@@ -66,7 +68,7 @@ impl Viewer {
         if let Some(path) = scenario {
             state.open(path);
         }
-        Self { state, engine, asked: None, asked_exact: None }
+        Self { state, engine, asked: None, asked_exact: None, pulse: Pulse::from_env() }
     }
 
     /// As eframe starts it, with what was remembered.
@@ -86,6 +88,9 @@ impl Viewer {
         out.into_iter().for_each(|message| self.state.apply(message, &context));
         self.ask();
         self.plan_repaint(&context);
+        if let Some(pulse) = &mut self.pulse {
+            pulse.beat(&self.state, &context);
+        }
     }
 
     /// What goes on also while the window is hidden.

@@ -29,6 +29,8 @@ mod panes;
 
 mod params;
 
+mod pulse;
+
 mod series;
 
 mod settings;

@@ -2,7 +2,6 @@
 
 mod editing;
 pub mod harness;
-mod latency;
 mod pages;
 mod pictures;
 mod scrubbing;
