@@ -23,15 +23,24 @@ use crate::{
 
 /// All panes.
 pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
-    egui::Panel::top("menu").show(ui, |ui| menu::show(ui, state, out));
-    egui::Panel::bottom("timeline").show(ui, |ui| timeline::show(ui, state, out));
+    // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass on a software adapter.
+    let style = ui.global_style();
+    let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
+    egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
+    egui::Panel::bottom("timeline").frame(panel).show(ui, |ui| timeline::show(ui, state, out));
     egui::Panel::left("parameters")
+        .frame(panel)
         .resizable(true)
         .default_size(300.0)
         .size_range(180.0..=600.0)
         .show(ui, |ui| parameters::show(ui, state, out));
-    egui::Panel::right("pages").resizable(true).default_size(330.0).size_range(220.0..=700.0).show(ui, |ui| pages(ui, state, out));
-    egui::CentralPanel::default().show(ui, |ui| {
+    egui::Panel::right("pages")
+        .frame(panel)
+        .resizable(true)
+        .default_size(330.0)
+        .size_range(220.0..=700.0)
+        .show(ui, |ui| pages(ui, state, out));
+    egui::CentralPanel::default().frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT)).show(ui, |ui| {
         notices::show(ui, state, out);
         image_view::show(ui, state, out);
     });

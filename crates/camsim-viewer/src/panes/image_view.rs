@@ -28,7 +28,6 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.put(pane, egui::Label::new("open a scenario, or drop one here"));
         return;
     };
-    ui.painter().rect_filled(pane, 0.0, ui.visuals().extreme_bg_color);
     if state.heard.shown.is_none() {
         if state.heard.fault.is_none() {
             ui.put(pane, egui::Spinner::new());

@@ -4,6 +4,8 @@ mod editors;
 mod lists;
 mod presets;
 
+use std::sync::LazyLock;
+
 use camsim_io::scenario_file::{Kind, keys};
 use eframe::egui::{self, RichText, Role, Ui};
 
@@ -23,46 +25,54 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     };
     presets::show(ui, out);
     egui::ScrollArea::vertical().id_salt("parameters").auto_shrink(false).show(ui, |ui| {
-        let mut groups: Vec<&str> = Vec::new();
-        for (key, _) in keys() {
-            let group = group_of(key);
-            if !groups.contains(&group) {
-                groups.push(group);
-            }
-        }
-        for group in groups {
+        for group in groups() {
             section(ui, document, group, out);
         }
     });
 }
 
-/// The table that a key stands in.
-fn group_of(key: &'static str) -> &'static str {
-    // Lists of tables belong to the table that the list is in.
-    let in_list =
-        keys().iter().find(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')));
-    let key = in_list.map_or(key, |(list, _)| *list);
-    key.rsplit_once('.').map_or("", |(group, _)| group)
+/// Keys of each table in the order of the format, without those of list elements; found once.
+fn groups() -> &'static [Group] {
+    static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
+        let mut groups: Vec<Group> = Vec::new();
+        for (key, kind) in keys().iter().filter(|(key, kind)| *kind != Kind::Later && !is_element(key)) {
+            let name = key.rsplit_once('.').map_or("", |(group, _)| group);
+            match groups.iter_mut().find(|group| group.name == name) {
+                Some(group) => group.keys.push((*key, *kind)),
+                None => groups.push(Group { name, keys: vec![(*key, *kind)] }),
+            }
+        }
+        groups
+    });
+    &GROUPS
 }
 
-fn section(ui: &mut Ui, document: &Document, group: &'static str, out: &mut Outbox) {
-    let of_group = || keys().iter().filter(move |(key, kind)| group_of(key) == group && *kind != Kind::Later);
-    let changed = of_group().any(|(key, _)| document.is_changed(key));
-    let wrong = of_group().any(|(key, _)| document.problem(key).is_some());
-    let name = if group.is_empty() { "general" } else { group };
+/// Whether a key is of the elements of a list.
+fn is_element(key: &str) -> bool {
+    keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')))
+}
+
+/// A table of the format.
+struct Group {
+    name: &'static str,
+    keys: Vec<(&'static str, Kind)>,
+}
+
+fn section(ui: &mut Ui, document: &Document, group: &Group, out: &mut Outbox) {
+    let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
+    let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
+    let group_name = group.name;
+    let name = if group_name.is_empty() { "general" } else { group_name };
     let mut title = RichText::new(name).strong();
     if wrong {
         title = title.color(ui.visuals().error_fg_color);
     } else if changed {
         title = title.color(ui.visuals().hyperlink_color);
     }
-    let open = matches!(group, "camera.lens" | "camera.shutter" | "camera.photometric");
-    egui::CollapsingHeader::new(title).id_salt(group).default_open(open).show(ui, |ui| {
-        for (key, kind) in of_group() {
-            let is_element =
-                keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')));
+    let open = matches!(group_name, "camera.lens" | "camera.shutter" | "camera.photometric");
+    egui::CollapsingHeader::new(title).id_salt(group_name).default_open(open).show(ui, |ui| {
+        for (key, kind) in &group.keys {
             match kind {
-                _ if is_element => {}
                 Kind::Tables => lists::show(ui, document, key, out),
                 kind => row(ui, document, key, *kind, out),
             }

@@ -52,6 +52,8 @@ impl Window {
             if let Some((scenario, exporter)) = start.take() {
                 *viewer = Some(Viewer::new(ui.ctx(), scenario, Settings::default(), exporter));
             }
+            // What eframe does by clearing.
+            ui.painter().rect_filled(ui.ctx().content_rect(), 0.0, ui.visuals().panel_fill);
             viewer.as_mut().expect("made in the first pass").show(ui);
         };
         let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
