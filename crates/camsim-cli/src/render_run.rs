@@ -1,6 +1,7 @@
 //! A sequence through a renderer into an output folder.
 
 use std::{
+    ops::ControlFlow,
     path::Path,
     sync::Arc,
     time::{Duration, Instant},
@@ -11,7 +12,7 @@ use camsim_core::{frame::RenderedFrame, plan::Planner, scenario::Scenario, seque
 use camsim_gpu::engine::Finished;
 use camsim_io::{
     manifest::{ResumeError, RunManifest, check_resume, in_shard},
-    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, camera_toml, frames_csv, trajectory_csv, write_atomic},
+    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
 };
 
 use crate::{
@@ -61,12 +62,13 @@ impl Outcome {
     }
 }
 
-/// Renders; `look` sees each finished frame before it is written.
+/// Renders; `look` sees each finished frame before it is written, and can stop the run: frames that are written then stay, and `run.json` says
+/// that it is not finished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
     console: &mut Console<'_>,
-    look: &mut dyn FnMut(&Finished),
+    look: &mut dyn FnMut(&Finished) -> ControlFlow<()>,
 ) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
     let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
@@ -99,7 +101,9 @@ pub fn run(
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
     let rendered = source.render(&todo, &mut |finished| {
-        look(&finished);
+        if look(&finished).is_break() {
+            return Err(WriteError::Stopped);
+        }
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));

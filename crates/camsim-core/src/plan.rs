@@ -191,9 +191,9 @@ pub struct Planner {
     shutter: Shutter,
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
-    outline: edges::SceneOutline,
-    grain: grain::SceneGrain,
-    surfaces: surfaces::Surfaces,
+    outline: Arc<edges::SceneOutline>,
+    grain: Arc<grain::SceneGrain>,
+    surfaces: Arc<surfaces::Surfaces>,
     truth: bool,
     max_side_px: u32,
     max_ideal_px: u64,
@@ -207,6 +207,33 @@ impl Planner {
     /// # Errors
     /// A camera or shutter that cannot be used.
     pub fn new(sequence: Arc<Sequence>, channels: &[Channel], max_side_px: u32) -> Result<Self, PlanError> {
+        let outline = Arc::new(edges::SceneOutline::new(&sequence.scene));
+        let grain = Arc::new(grain::SceneGrain::new(&sequence.scene));
+        let surfaces = Arc::new(surfaces::Surfaces::new(sequence.scene.clone()));
+        Self::of_scene(sequence, channels, max_side_px, outline, grain, surfaces)
+    }
+
+    /// A planner for the frames of another sequence. Where its scene is this one's (the same [`Arc`]), what is known of the scene is taken
+    /// over: finding it anew takes longer than a plan. No plan changes by it.
+    ///
+    /// # Errors
+    /// As [`Planner::new`].
+    pub fn renewed(&self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<Self, PlanError> {
+        if !Arc::ptr_eq(&self.sequence.scene, &sequence.scene) {
+            return Self::new(sequence, channels, self.max_side_px);
+        }
+        let (outline, grain, surfaces) = (self.outline.clone(), self.grain.clone(), self.surfaces.clone());
+        Self::of_scene(sequence, channels, self.max_side_px, outline, grain, surfaces)
+    }
+
+    fn of_scene(
+        sequence: Arc<Sequence>,
+        channels: &[Channel],
+        max_side_px: u32,
+        outline: Arc<edges::SceneOutline>,
+        grain: Arc<grain::SceneGrain>,
+        surfaces: Arc<surfaces::Surfaces>,
+    ) -> Result<Self, PlanError> {
         let camera = &sequence.scenario.camera;
         let shutter = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?;
         let zoom = ZoomTable::from_spec(camera)?;
@@ -215,9 +242,6 @@ impl Planner {
             None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
         };
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
-        let outline = edges::SceneOutline::new(&sequence.scene);
-        let grain = grain::SceneGrain::new(&sequence.scene);
-        let surfaces = surfaces::Surfaces::new(sequence.scene.clone());
         let max_ideal_px = MAX_IDEAL_PX;
         Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px, max_ideal_px, groups: Mutex::default() })
     }

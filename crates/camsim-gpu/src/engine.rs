@@ -6,19 +6,6 @@ use std::{
     time::Instant,
 };
 
-use camsim_core::{
-    frame::RenderedFrame,
-    noise::tail_table,
-    photometric::vignette_weights,
-    plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
-    pose::CameraPose,
-    scenario::Channel,
-    scene::LodSelection,
-    sequence::Sequence,
-    temporal::IdealGeometry,
-};
-use wgpu::util::DeviceExt;
-
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
     ideal::{IdealPass, IdealTarget},
@@ -32,12 +19,23 @@ use crate::{
     staging::Staging,
     upload::SceneBuffers,
 };
+use camsim_core::{
+    frame::RenderedFrame,
+    noise::tail_table,
+    plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
+    pose::CameraPose,
+    scenario::Channel,
+    scene::LodSelection,
+    sequence::Sequence,
+    temporal::IdealGeometry,
+};
 
 mod ahead;
 mod error;
 mod finished;
 mod inspect;
 mod readback;
+mod renew;
 mod slot;
 
 use ahead::{Ahead, Prepared, Preparer};
@@ -46,6 +44,7 @@ pub(crate) use error::RenderErrorBase;
 pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
 use readback::{Output, coords, look_for_unknown, read_mapped};
+use renew::{storage_buffer, vignette_buffer};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
@@ -114,31 +113,14 @@ impl Engine {
     ) -> Result<Session<'_>, RenderError<E>> {
         let gpu = &self.gpu;
         let planner = Arc::new(Planner::new(sequence.clone(), channels, gpu.max_side_px())?);
-        let pixels = u64::from(sequence.scenario.camera.size_px[0]) * u64::from(sequence.scenario.camera.size_px[1]);
-        gpu.check_storage("the output frame's colour", 16 * pixels, "reduce camera.size_px")?;
-        if planner.wants_truth() {
-            let bytes = size_of::<Truth>() as u64 * pixels;
-            gpu.check_storage("the output frame's depth and coords", bytes, "reduce camera.size_px or leave them out of output.channels")?;
-        }
+        self.check_output(&planner)?;
         let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let preset = sequence.scenario.quality.preset;
         let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some())?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
-        let camera = &sequence.scenario.camera;
-        let weights = match &sequence.vignette {
-            Some(map) => vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds),
-            None => vec![1.0],
-        };
-        let storage = |label, values: &[f32]| {
-            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents: bytemuck::cast_slice(values),
-                usage: wgpu::BufferUsages::STORAGE,
-            })
-        };
         let session = Session {
-            vignette: storage("camsim.vignette", &weights),
-            noise_table: storage("camsim.noise_table", &tail_table()),
+            vignette: vignette_buffer(gpu, &sequence),
+            noise_table: storage_buffer(gpu, "camsim.noise_table", &tail_table()),
             ideal_pass,
             reverse_pass: ReversePass::new(gpu),
             lens_pass: None,

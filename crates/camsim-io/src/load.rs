@@ -7,7 +7,7 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
     mount::{CameraPath, MountError},
-    scenario::{HeightReference, PatternCentre, Scenario},
+    scenario::{FlightSpec, HeightReference, PatternCentre, Scenario},
     scene::{Encoding, Mesh, Scene, linear_from_srgb},
     sequence::Sequence,
     tracker::{Tracked, TrackerError, track},
@@ -83,9 +83,9 @@ pub struct Loaded {
     /// What rendering needs.
     pub sequence: Arc<Sequence>,
     /// The cleaned log; its report counts every repair.
-    pub log: FlightLog,
+    pub log: Arc<FlightLog>,
     /// The tracked trajectory with its limits.
-    pub tracked: Tracked,
+    pub tracked: Arc<Tracked>,
     /// Where the terrain lies.
     pub terrain: Option<TerrainSummary>,
     /// What a user should know but need not stop for.
@@ -97,25 +97,56 @@ pub struct Loaded {
 /// # Errors
 /// [`LoadError`] names the file or key and what to do.
 pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
-    let (log, tracked) = load_flight(scenario)?;
-    let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount)?;
-    let (scene, terrain) = load_scene(scenario, &log)?;
+    load_beside(scenario, None)
+}
+
+/// As [`load_sequence`], but what `before` has read for the same keys is not read again, even if files have changed since: for programs that
+/// change a scenario value by value. What is taken over is shared, so that renderers can see that it is the same.
+///
+/// # Errors
+/// As [`load_sequence`].
+pub fn reload_sequence(scenario: &Scenario, before: &Loaded) -> Result<Loaded, LoadError> {
+    load_beside(scenario, Some(before))
+}
+
+fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, LoadError> {
+    let known = before.map(|before| (before, &before.sequence.scenario));
+    let (log, trajectory, tracked) = match known.filter(|(_, of)| reads_same_flight(of, scenario)) {
+        Some((before, _)) => (before.log.clone(), before.sequence.path.trajectory.clone(), before.tracked.clone()),
+        None => {
+            let (log, tracked) = load_flight(scenario)?;
+            (Arc::new(log), Arc::new(tracked.trajectory.clone()), Arc::new(tracked))
+        }
+    };
+    let path = CameraPath::new(trajectory, &scenario.camera.mount)?;
+    let same_scene = |before: &Loaded, of: &Scenario| {
+        of.scene == scenario.scene && of.flight.height == scenario.flight.height && before.log.frame == log.frame
+    };
+    let (scene, terrain) = match known.filter(|(before, of)| same_scene(before, of)) {
+        Some((before, _)) => (before.sequence.scene.clone(), before.terrain.clone()),
+        None => {
+            let (scene, terrain) = load_scene(scenario, &log)?;
+            (Arc::new(scene), terrain)
+        }
+    };
+    let picture = &scenario.camera.photometric.vignette;
     let of_vignette = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
-    let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose().map_err(of_vignette)?.map(Arc::new);
+    let vignette = match known.filter(|(_, of)| of.camera.photometric.vignette == *picture) {
+        Some((before, _)) => before.sequence.vignette.clone(),
+        None => picture.as_deref().map(read_gray_image).transpose().map_err(of_vignette)?.map(Arc::new),
+    };
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
-    let sequence = Sequence {
-        scenario: scenario.clone(),
-        path: Arc::new(path),
-        epoch_ns: log.epoch_ns,
-        start_s,
-        frames,
-        scene: Arc::new(scene),
-        vignette,
-        zoom_track,
-    };
+    let sequence =
+        Sequence { scenario: scenario.clone(), path: Arc::new(path), epoch_ns: log.epoch_ns, start_s, frames, scene, vignette, zoom_track };
     let warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings })
+}
+
+/// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all of the log is tracked.
+fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
+    let whole = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
+    whole(&a.flight) == whole(&b.flight) && a.tracker == b.tracker && height_plan(a).0 == height_plan(b).0
 }
 
 /// The log and its trajectory alone: no scene is read.

@@ -12,6 +12,7 @@ pub(crate) mod check;
 pub(crate) mod schema;
 pub(crate) mod tree;
 
+pub use schema::Kind;
 use tree::Tree;
 
 /// Why a scenario cannot be used.
@@ -103,6 +104,12 @@ pub fn read_checked_camera(path: &Path) -> Result<CameraSpec, ScenarioError> {
 /// The commented default scenario: what `camsim render --print-default` prints.
 pub fn print_default() -> String {
     include_str!("scenario_file/default.toml").to_owned()
+}
+
+/// Every key of a scenario file and what it takes, in the order of `--print-default`; elements of arrays of tables stand without their index.
+#[must_use]
+pub fn keys() -> &'static [(&'static str, Kind)] {
+    schema::SCENARIO.keys
 }
 
 fn finish(mut tree: Tree, sets: &[(String, String)], preset: Option<Preset>) -> Result<Scenario, ScenarioError> {

@@ -27,7 +27,7 @@ mod png_file;
 mod tables;
 
 pub use atomic::write_atomic;
-pub use encode::{luminance, srgb_from_linear};
+pub use encode::{luminance, srgb_from_linear, srgb8};
 pub use frames::{FrameFiles, FrameWriter, WriteSummary};
 pub use picture::write_picture;
 pub use png_file::contact_sheet;
@@ -65,6 +65,9 @@ pub enum WriteError {
     /// The threads are gone without an error of their own.
     #[error("the writer threads ended early; run again")]
     Ended,
+    /// Somebody has asked for it.
+    #[error("stopped on request; frames that are written stay as they are")]
+    Stopped,
 }
 
 fn advice(source: &io::Error) -> &'static str {

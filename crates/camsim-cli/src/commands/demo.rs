@@ -1,6 +1,6 @@
 //! `camsim demo`: pictures without a scenario of one's own.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{ops::ControlFlow, path::PathBuf, sync::Arc};
 
 use camsim_core::{frame::RenderedFrame, mount::CameraPath, scenario::LensSpec, sequence::Sequence};
 use camsim_gpu::{AdapterChoice, Engine};
@@ -54,6 +54,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             thumbnails.push(finished.frame.clone());
         }
         seen += 1;
+        ControlFlow::Continue(())
     })?;
     let sheet = folder.join("contact-sheet.png");
     contact_sheet(&sheet, &thumbnails, SHEET_COLUMNS, SHEET_SHRINK).or_failed()?;

@@ -1,10 +1,13 @@
 //! `camsim render`: the main job.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::ControlFlow,
+    path::{Path, PathBuf},
+};
 
 use anyhow::anyhow;
 use camsim_core::scenario::{Auto, Channel, ImageFormat, Preset, Scenario, Solver, validate};
-use camsim_gpu::{AdapterChoice, Engine};
+use camsim_gpu::{AdapterChoice, Engine, engine::Finished};
 use camsim_io::scenario_file::print_default;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
@@ -133,7 +136,11 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let mut times = TimesTable::default();
     console.detail(format_args!("adapter: {}", source.adapter()));
-    let outcome = render_run::run(&job, &mut *source, console, &mut |finished| times.add(&finished.times)).inspect_err(|failure| {
+    let mut look = |finished: &Finished| {
+        times.add(&finished.times);
+        ControlFlow::Continue(())
+    };
+    let outcome = render_run::run(&job, &mut *source, console, &mut look).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
             console.note("frames that are written stay as they are: --resume goes on with the others");
         }

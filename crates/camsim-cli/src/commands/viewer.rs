@@ -1,8 +1,18 @@
 //! `camsim viewer`.
 
-use std::path::PathBuf;
+use std::{io, ops::ControlFlow, path::PathBuf, sync::Arc};
 
-use crate::failure::{Failure, OrFail};
+use camsim_core::scenario::{Auto, Solver};
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_io::load::load_sequence;
+use camsim_viewer::ExportJob;
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    frame_source::{Device, FrameSource, Rays},
+    render_run::{self, Job},
+};
 
 /// Open the viewer
 #[derive(Debug, clap::Args)]
@@ -13,5 +23,69 @@ pub struct Args {
 
 /// Opens the window and stays until it is closed.
 pub fn run(args: &Args) -> Result<(), Failure> {
-    camsim_viewer::run(args.scenario.clone()).or_failed()
+    let exporter = Arc::new(|job: &ExportJob| export(job).map_err(|failure| failure.to_string().trim_start_matches("error: ").to_owned()));
+    camsim_viewer::run(args.scenario.clone(), Some(exporter)).or_failed()
+}
+
+/// What `camsim render` does with the scenario; warnings go into `run.json`.
+pub fn export(job: &ExportJob) -> Result<String, Failure> {
+    let (mut out, mut err) = (io::sink(), io::sink());
+    let mut console = Console::new(&mut out, &mut err);
+    console.set_volume(true, false);
+    let loaded = load_sequence(&job.scenario).or_bad_input()?;
+    let [first, end] = job.frames;
+    let frames: Vec<u64> = (first..end.min(loaded.sequence.frames)).collect();
+    let folder = &job.folder;
+    let run = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
+    let engine;
+    let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle) {
+        Box::new(Rays::new(&loaded.sequence)?)
+    } else {
+        engine = Engine::new(AdapterChoice::Best)?;
+        Box::new(Device::new(&engine, &loaded.sequence)?)
+    };
+    let mut look = |_: &_| if job.tick() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let outcome = render_run::run(&run, &mut *source, &mut console, &mut look)?;
+    let (seconds, rate) = (outcome.time.as_secs_f64(), outcome.frames_per_s());
+    Ok(format!("{} frames in {seconds:.1} s, {rate:.1} frames/s, in {}", outcome.frames, folder.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use camsim_io::scenario_file::read_scenario;
+
+    use super::*;
+
+    fn small() -> camsim_core::scenario::Scenario {
+        let sets = [
+            ("camera.size_px", "[64, 48]"),
+            ("camera.focal_px", "[50.0, 50.0]"),
+            ("camera.principal_point_px", "[31.5, 23.5]"),
+            ("output.format", "[\"png\"]"),
+        ];
+        let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+        read_scenario(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml"), &sets, None).expect("legal")
+    }
+
+    #[test]
+    #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+    fn an_export_stops_when_it_is_told_to_and_else_writes_what_render_writes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let job = ExportJob::new(small(), folder.path().join("all"), [3, 6]);
+        export(&job).expect("written");
+        assert_eq!(job.progress().done, 3);
+        assert!(folder.path().join("all/run.json").is_file());
+        let names: Vec<String> = (3..6).map(|frame| format!("all/color/frame_{frame:06}.png")).collect();
+        assert!(names.iter().all(|name| folder.path().join(name).is_file()), "{names:?}");
+
+        let stopped = ExportJob::new(small(), folder.path().join("stopped"), [0, 40]);
+        stopped.cancel();
+        let told = export(&stopped).expect_err("stopped").to_string();
+        assert!(told.contains("stopped on request"), "{told}");
+        assert_eq!(stopped.progress().done, 1, "asked after the first frame");
+        let manifest = std::fs::read_to_string(folder.path().join("stopped/run.json")).expect("a manifest");
+        assert!(manifest.contains("\"finished\": false"), "{manifest}");
+    }
 }

@@ -50,6 +50,9 @@ pub struct CleaningReport {
     pub longest_step_s: f64,
     /// Rows put in between because angles turn by more than 90 degrees.
     pub inserted: usize,
+    /// Where on the timeline the first few rows of each kind are, as far as they have a time: seconds since the first good row, divided by the
+    /// `speed` factor; ascending.
+    pub repaired_s: Vec<f64>,
     /// How angles were read: `Wrapped` or `Continuous`, never `Auto`.
     pub angles: AngleKind,
 }
@@ -58,6 +61,11 @@ impl CleaningReport {
     /// Whether nothing had to be repaired (gaps are not repaired, only counted).
     pub fn is_clean(&self) -> bool {
         self.findings().iter().all(|(_, finding)| finding.count == 0)
+    }
+
+    /// Whether a line of the file is among those that [`Finding::lines`] keep.
+    pub(super) fn names(&self, line: usize) -> bool {
+        self.findings().iter().any(|(_, finding)| finding.lines.contains(&line))
     }
 
     fn findings(&self) -> [(&'static str, &Finding); 7] {

@@ -80,6 +80,10 @@ fn faults_are_found_counted_and_repaired() {
     assert_eq!(report.duplicates.lines, [241]);
     assert_eq!(report.merged.lines, [251]);
     assert_eq!(report.out_of_order.lines, [301]);
+    // All but the row without a time.
+    let repaired_s = [5.0, 7.5, 10.5, 11.0, 11.5, 11.95, 12.450_05, 15.0];
+    assert_eq!(report.repaired_s.len(), repaired_s.len());
+    assert!(report.repaired_s.iter().zip(repaired_s).all(|(found, at)| (found - at).abs() < 1e-9), "{:?}", report.repaired_s);
     assert_eq!(log.rows.len(), 400 - 1 - 3 - 2);
     assert!(log.rows.windows(2).all(|pair| pair[1].t_s - pair[0].t_s >= 1e-3));
     let truth = body_from_euler_deg([0.0, 1.0, 180.0]);

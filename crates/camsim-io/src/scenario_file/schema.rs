@@ -23,8 +23,8 @@ pub(crate) const SCENARIO: Schema =
     Schema { keys: KEYS, later_words: LATER_WORDS, required: REQUIRED, listing: "`camsim render --print-default` lists all keys" };
 
 /// What a key takes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Kind {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
     /// A number.
     Number,
     /// A number, or one of these words.

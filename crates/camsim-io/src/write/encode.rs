@@ -41,7 +41,7 @@ static SRGB: LazyLock<SrgbTable> = LazyLock::new(|| {
 });
 
 /// Nearest 8-bit sRGB code of a linear value, by table instead of a power per sample; NaN is 0.
-pub(super) fn srgb8(linear: f32) -> u8 {
+pub fn srgb8(linear: f32) -> u8 {
     if linear.is_nan() {
         return 0;
     }

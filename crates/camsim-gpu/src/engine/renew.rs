@@ -1,0 +1,81 @@
+//! Going on with another sequence: what a viewer does whenever somebody turns a knob. Kernels and the scene's pictures, which take longest to
+//! make, stay on the device; what depends on the camera is made anew.
+
+use std::sync::Arc;
+
+use camsim_core::{photometric::vignette_weights, plan::Planner, scenario::Channel, sequence::Sequence};
+use wgpu::util::DeviceExt;
+
+use super::{Engine, FRAMES_IN_FLIGHT, RenderError, Session, slot::Slot};
+use crate::{
+    context::{GpuContext, GpuError},
+    layout::Truth,
+};
+
+impl Session<'_> {
+    /// Goes on with `sequence`: the next frames are the ones that a session of its own would make, to the last bit. Fast where its scene is the
+    /// one of this session (the same [`Arc`]) and its preset too; otherwise everything is made anew.
+    ///
+    /// # Errors
+    /// As [`Engine::session`]; the session then stays as it was.
+    pub fn renew<E: std::error::Error + 'static>(&mut self, sequence: Arc<Sequence>, channels: &[Channel]) -> Result<(), RenderError<E>> {
+        let before = self.planner.sequence();
+        let (old, new) = (&before.scenario, &sequence.scenario);
+        if !Arc::ptr_eq(&before.scene, &sequence.scene) || old.quality.preset != new.quality.preset {
+            *self = self.engine.session(sequence, channels)?;
+            return Ok(());
+        }
+        let gpu = &self.engine.gpu;
+        let planner = Arc::new(self.planner.renewed(sequence.clone(), channels)?);
+        self.engine.check_output(&planner)?;
+        let same_size = old.camera.size_px == new.camera.size_px;
+        if !same_size || planner.wants_truth() != self.planner.wants_truth() {
+            let truth = planner.wants_truth();
+            self.slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &self.ideal_pass, &sequence, &self.buffers, truth)).collect();
+            self.drawn = None;
+        }
+        if !same_size {
+            self.lists = None;
+        }
+        self.lens_map = None;
+        self.zoom_maps.clear();
+        self.vignette = vignette_buffer(gpu, &sequence);
+        // Bind groups hold what has just been replaced.
+        self.targets.iter_mut().flat_map(|target| &mut target.groups).for_each(|groups| groups.clear());
+        self.planner = planner;
+        self.engine.check()?;
+        Ok(())
+    }
+}
+
+impl Engine {
+    /// Refuses output frames that no storage buffer holds.
+    pub(super) fn check_output(&self, planner: &Planner) -> Result<(), GpuError> {
+        let [width, height] = planner.sequence().scenario.camera.size_px.map(u64::from);
+        self.gpu.check_storage("the output frame's colour", 16 * width * height, "reduce camera.size_px")?;
+        if planner.wants_truth() {
+            let bytes = size_of::<Truth>() as u64 * width * height;
+            let fix = "reduce camera.size_px or leave them out of output.channels";
+            self.gpu.check_storage("the output frame's depth and coords", bytes, fix)?;
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn storage_buffer(gpu: &GpuContext, label: &str, values: &[f32]) -> wgpu::Buffer {
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents: bytemuck::cast_slice(values),
+        usage: wgpu::BufferUsages::STORAGE,
+    })
+}
+
+/// Weights of the vignette map at every pixel; one for all without a map.
+pub(super) fn vignette_buffer(gpu: &GpuContext, sequence: &Sequence) -> wgpu::Buffer {
+    let camera = &sequence.scenario.camera;
+    let weights = match &sequence.vignette {
+        Some(map) => vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds),
+        None => vec![1.0],
+    };
+    storage_buffer(gpu, "camsim.vignette", &weights)
+}

@@ -1,0 +1,110 @@
+use camsim_io::scenario_file::parse_scenario;
+
+use super::*;
+
+fn demo() -> Document {
+    Document::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml")).expect("the built-in scenario")
+}
+
+#[test]
+fn every_key_of_the_format_has_a_place() {
+    let mut document = demo();
+    for (key, kind) in keys() {
+        let under_list = keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.starts_with(&format!("{list}.")));
+        if matches!(kind, Kind::Tables | Kind::Later) || under_list {
+            continue;
+        }
+        document.set(key, Some(Value::Integer(7)), false);
+        assert_eq!(document.value(key), Some(&Value::Integer(7)), "{key}");
+        assert!(document.undo());
+        assert!(!document.is_changed(key), "{key}");
+    }
+}
+
+#[test]
+fn a_drag_is_one_step_and_undo_takes_all_of_it_back() {
+    let mut document = demo();
+    let key = "camera.shutter.readout_ms";
+    for ms in 1..20 {
+        document.set(key, Some(Value::Float(f64::from(ms))), true);
+    }
+    document.end_gesture();
+    document.set(key, Some(Value::Float(50.0)), true);
+    document.end_gesture();
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 50.0);
+    assert!(document.undo());
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 19.0);
+    assert!(document.undo());
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 33.0);
+    assert!(!document.undo());
+    assert!(document.redo() && document.redo() && !document.redo());
+    assert_eq!(document.scenario.camera.shutter.readout_ms, 50.0);
+}
+
+#[test]
+fn what_is_not_legal_is_named_and_the_last_legal_scenario_stays() {
+    let mut document = demo();
+    document.set("camera.shutter.exposure_ms", Some(Value::Float(-3.0)), false);
+    let problem = document.problem("camera.shutter").expect("a problem");
+    assert_eq!(problem.key, "camera.shutter.exposure_ms");
+    assert!(document.problem("camera.lens").is_none());
+    assert_eq!(document.scenario.camera.shutter.exposure_ms, 8.0);
+    assert!(document.save(Path::new("never.toml")).expect_err("not legal").contains("exposure_ms"));
+    document.reset("camera.shutter.exposure_ms");
+    assert!(document.problems.is_empty());
+}
+
+#[test]
+fn a_saved_scenario_opens_as_the_same_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demo_path = camsim_io::builtin::unpack(folder.path()).expect("unpacked");
+    let mut document = Document::open(&demo_path).expect("the built-in scenario");
+    document.set("camera.lens.coefficients", Some(Value::Array(vec![Value::Float(-0.3)])), false);
+    document.set("camera.mount.vibration.1.hz", Some(Value::Float(40.0)), false);
+    document.set("camera.mount.vibration.0", None, false);
+    document.set("flight.window_s", None, false);
+    assert!(document.is_unsaved());
+    let saved = folder.path().join("changed.toml");
+    document.save(&saved).expect("saved");
+    assert!(!document.is_unsaved());
+    let again = Document::open(&saved).expect("what was saved");
+    assert_eq!(again.scenario, document.scenario);
+    assert_eq!(again.scenario.camera.mount.vibration.len(), 1);
+    let text = std::fs::read_to_string(&saved).expect("text");
+    assert!(text.contains("log = \"demo_flight.csv\""), "paths are relative to the file:\n{text}");
+}
+
+#[test]
+fn the_command_line_says_what_was_changed() {
+    let mut document = demo();
+    document.set("camera.shutter.readout_ms", Some(Value::Float(0.0)), false);
+    document.set("camera.lens.coefficients", Some(Value::Array(vec![Value::Float(0.1), Value::Float(0.0)])), false);
+    let line = document.command_line();
+    assert!(line.starts_with("camsim render "), "{line}");
+    assert!(line.contains("--set camera.shutter.readout_ms=0.0"), "{line}");
+    assert!(line.contains("--set 'camera.lens.coefficients=[0.1, 0.0]'"), "{line}");
+    // What a shell makes of it gives the same scenario.
+    let sets: Vec<_> = document.changes().into_iter().map(|(key, value)| (key, value.to_string())).collect();
+    let text = std::fs::read_to_string(&document.path).expect("text");
+    assert_eq!(parse_scenario(&text, &document.path, &sets).expect("legal"), *document.scenario);
+}
+
+#[test]
+fn a_calibration_replaces_the_camera_but_not_its_mount() {
+    let mut document = demo();
+    let camera = CameraSpec { focal_px: [300.0, 301.0], ..CameraSpec::default() };
+    document.set_camera(&camera).expect("a camera");
+    assert_eq!(document.scenario.camera.focal_px, [300.0, 301.0]);
+    assert_eq!(document.scenario.camera.mount, demo().scenario.camera.mount);
+    assert!(document.undo());
+    assert_eq!(document.scenario, demo().scenario);
+}
+
+#[test]
+fn a_file_that_is_no_scenario_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bad.toml");
+    std::fs::write(&path, "[camera]\nfsp = 3\n").expect("written");
+    let error = Document::open(&path).expect_err("not a scenario");
+    assert!(error.contains("bad.toml:2") && error.contains("fps"), "{error}");
+}

@@ -1,0 +1,117 @@
+//! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks with them.
+//!
+//! The window never waits. What it wants stands in a [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a
+//! channel, and a repaint is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a device has
+//! one queue, in order, and a hand that moves on must not wait for a full frame, nor the window for either. Finished pictures cross by way of
+//! the host, as `camsim render` reads them. What is loaded is shared.
+
+mod exact;
+mod library;
+mod mailbox;
+mod messages;
+mod picture;
+mod variants;
+mod worker;
+
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        Arc,
+        mpsc::{Receiver, Sender, channel},
+    },
+};
+
+use library::Library;
+pub use mailbox::Mailbox;
+pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Wanted};
+pub use picture::{Difference, Picture, ramp};
+pub use variants::{preview_factor, staged};
+
+/// The engine's threads as the window sees them. Dropping it ends them after what they are at.
+#[derive(Debug)]
+pub struct Handle {
+    previews: Arc<Mailbox<Wanted>>,
+    frames: Arc<Mailbox<Wanted>>,
+    exact: Arc<Mailbox<ExactWanted>>,
+    replies: Receiver<Reply>,
+}
+
+/// Where replies go; each asks for a repaint.
+#[derive(Clone)]
+pub struct Speaker {
+    replies: Sender<Reply>,
+    repaint: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl std::fmt::Debug for Speaker {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Speaker")
+    }
+}
+
+impl Speaker {
+    /// A closed window ends the conversation: nothing to do about a failed send.
+    pub(crate) fn say(&self, reply: Reply) {
+        let _ = self.replies.send(reply);
+        (self.repaint)();
+    }
+}
+
+impl Handle {
+    /// Starts the threads; `repaint` is called with each reply, from theirs.
+    pub fn start(repaint: impl Fn() + Send + Sync + 'static) -> Self {
+        let (sender, replies) = channel();
+        let speaker = Speaker { replies: sender, repaint: Arc::new(repaint) };
+        let (previews, frames, exact) = (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
+        let library = Arc::new(Library::default());
+        for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &frames)] {
+            let (mailbox, library, voice) = (mailbox.clone(), library.clone(), speaker.clone());
+            spawn(name, speaker.clone(), move || worker::run(&mailbox, &library, &voice));
+        }
+        let (mailbox, voice) = (exact.clone(), speaker.clone());
+        spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice));
+        Self { previews, frames, exact, replies }
+    }
+
+    /// Replaces what is wanted of the renderer.
+    pub fn want(&self, wanted: Wanted) {
+        match wanted.size {
+            Size::Preview => {
+                self.frames.clear();
+                self.previews.put(wanted);
+            }
+            Size::Full => self.frames.put(wanted),
+        }
+    }
+
+    /// Replaces what is wanted of the oracle.
+    pub fn want_exact(&self, wanted: ExactWanted) {
+        self.exact.put(wanted);
+    }
+
+    /// What has been said since the last time.
+    pub fn replies(&self) -> impl Iterator<Item = Reply> + '_ {
+        self.replies.try_iter()
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        self.previews.close();
+        self.frames.close();
+        self.exact.close();
+    }
+}
+
+/// A thread that comes back after a panic, with a word about it: a fault in one frame must not leave the window with nothing behind it.
+fn spawn(name: &str, speaker: Speaker, body: impl Fn() + Send + 'static) {
+    let voice = speaker.clone();
+    let body = move || {
+        while catch_unwind(AssertUnwindSafe(&body)).is_err() {
+            voice.say(Reply::Failed("the renderer stopped at a fault of its own; it goes on with the next change".into()));
+        }
+    };
+    if let Err(error) = std::thread::Builder::new().name(name.into()).spawn(body) {
+        speaker.say(Reply::Failed(format!("no thread for the renderer: {error}; close other programs and open the viewer again")));
+    }
+}

@@ -1,0 +1,131 @@
+//! A rendered frame as the window shows it.
+
+use camsim_core::{frame::RenderedFrame, plan::FramePlan};
+use camsim_gpu::engine::FrameTimes;
+use camsim_io::write::{srgb_from_linear, srgb8};
+use eframe::egui::{Color32, ColorImage};
+
+use super::messages::Stage;
+
+/// A picture with all that there is to say about it.
+#[derive(Debug)]
+pub struct Picture {
+    /// What is in it.
+    pub stage: Stage,
+    /// Linear values and rows.
+    pub frame: RenderedFrame,
+    /// How it was made.
+    pub plan: FramePlan,
+    /// How long that took.
+    pub times: FrameTimes,
+    /// As a screen shows it.
+    pub image: ColorImage,
+}
+
+/// The difference of two pictures, enlarged.
+#[derive(Debug, Default)]
+pub struct Difference {
+    /// Grey is none.
+    pub image: ColorImage,
+    /// Root of the mean square over pixels that are valid in both, 1/255 of the linear range.
+    pub rms_dn: f64,
+    /// Largest, same unit.
+    pub max_dn: f64,
+    /// Share of the pixels that are valid in just one of them.
+    pub one_sided: f64,
+}
+
+/// The codes that an sRGB PNG of these linear values has; transparent where there is no ray.
+pub fn screen(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
+    let rgba: Vec<u8> = color_rgba
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .flat_map(|&[r, g, b, a]| if a > 0.0 { [srgb8(r), srgb8(g), srgb8(b), 255] } else { [0; 4] })
+        .collect();
+    ColorImage::from_rgba_unmultiplied(size_px.map(|side| side as usize), &rgba)
+}
+
+/// `a - b` times `gain` about a middle grey, in linear values; `None` for pictures of different size.
+pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32) -> Option<Difference> {
+    if a.len() != b.len() || a.len() != 4 * size_px[0] as usize * size_px[1] as usize {
+        return None;
+    }
+    let (mut squares, mut max, mut both, mut one) = (0.0_f64, 0.0_f64, 0_u64, 0_u64);
+    let pixels = a.as_chunks::<4>().0.iter().zip(b.as_chunks::<4>().0).map(|(a, b)| match (a[3] > 0.0, b[3] > 0.0) {
+        (true, true) => {
+            both += 1;
+            let rgb: [f32; 3] = std::array::from_fn(|k| a[k] - b[k]);
+            squares += rgb.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>();
+            max = rgb.iter().fold(max, |max, d| max.max(f64::from(d.abs())));
+            let [r, g, b] = rgb.map(|d| (255.0 * (0.5 + gain * d).clamp(0.0, 1.0)).round() as u8);
+            Color32::from_rgb(r, g, b)
+        }
+        (false, false) => Color32::TRANSPARENT,
+        _ => {
+            one += 1;
+            Color32::from_rgb(255, 0, 255)
+        }
+    });
+    let pixels: Vec<Color32> = pixels.collect();
+    let image = ColorImage::new(size_px.map(|side| side as usize), pixels);
+    let rms_dn = 255.0 * (squares / (3 * both.max(1)) as f64).sqrt();
+    let one_sided = one as f64 / (image.pixels.len().max(1)) as f64;
+    Some(Difference { image, rms_dn, max_dn: 255.0 * max, one_sided })
+}
+
+/// Depth from near (bright) to far (dark) by its logarithm; transparent where nothing is.
+pub fn depth_image(size_px: [u32; 2], depth_m: &[f32]) -> ColorImage {
+    let known = || depth_m.iter().copied().filter(|d| *d > 0.0 && d.is_finite());
+    let (near, far) = known().fold((f32::INFINITY, 0.0_f32), |(near, far), d| (near.min(d), far.max(d)));
+    let span = (far / near).ln().max(1e-6);
+    let pixels = depth_m.iter().map(|&d| {
+        if d <= 0.0 || !d.is_finite() {
+            return Color32::TRANSPARENT;
+        }
+        let share = f64::from((d / near).ln() / span).clamp(0.0, 1.0);
+        let [r, g, b] = ramp(1.0 - share);
+        Color32::from_rgb(r, g, b)
+    });
+    ColorImage::new(size_px.map(|side| side as usize), pixels.collect())
+}
+
+/// From dark blue over green to yellow, rising in lightness all the way.
+pub fn ramp(share: f64) -> [u8; 3] {
+    let share = share.clamp(0.0, 1.0);
+    let linear = [0.9 * share.powi(2), 0.02 + 0.8 * share, 0.25 * (1.0 - share).powi(2) + 0.08];
+    linear.map(|value| (255.0 * srgb_from_linear(value)).round() as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_srgb_and_invalid_pixels_transparent() {
+        let image = screen([2, 1], &[0.215_861, 0.0, 1.0, 1.0, 0.3, 0.0, 0.0, 0.0]);
+        assert_eq!(image.pixels[0].to_array(), [128, 0, 255, 255]);
+        assert_eq!(image.pixels[1], Color32::TRANSPARENT);
+    }
+
+    #[test]
+    fn a_difference_has_the_size_of_its_values() {
+        let a = [0.5, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.0];
+        let b = [0.4, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let found = difference([3, 1], &a, &b, 4.0).expect("of one size");
+        assert!((found.rms_dn - 255.0 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-4, "{}", found.rms_dn);
+        assert!((found.max_dn - 25.5).abs() < 1e-4);
+        assert!((found.one_sided - 1.0 / 3.0).abs() < 1e-9);
+        assert_eq!(found.image.pixels[0].to_array(), [230, 128, 128, 255]);
+        assert_eq!(found.image.pixels[2], Color32::TRANSPARENT);
+        assert!(difference([2, 1], &a, &b, 4.0).is_none());
+    }
+
+    #[test]
+    fn near_is_bright_and_nothing_is_transparent() {
+        let image = depth_image([3, 1], &[10.0, 1000.0, 0.0]);
+        let light = |pixel: Color32| u32::from(pixel.r()) + u32::from(pixel.g()) + u32::from(pixel.b());
+        assert!(light(image.pixels[0]) > light(image.pixels[1]));
+        assert_eq!(image.pixels[2], Color32::TRANSPARENT);
+    }
+}

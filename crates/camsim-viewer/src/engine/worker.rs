@@ -1,0 +1,203 @@
+//! A thread that renders pictures.
+
+use std::{convert::Infallible, sync::Arc, time::Instant};
+
+use camsim_core::{mount::CameraPath, scenario::Channel, sequence::Sequence};
+use camsim_gpu::{
+    AdapterChoice, Engine, GpuError, RenderError,
+    engine::{Finished, Session},
+};
+use camsim_io::load::LoadError;
+
+use super::{
+    Speaker,
+    library::Library,
+    mailbox::Mailbox,
+    messages::{FrameReply, Reply, Size, Stage, Truth, Wanted},
+    picture::{Picture, depth_image, difference, screen},
+    variants::{preview, staged},
+};
+
+/// Pictures that are kept: two stages in two sizes, and those of the frame before.
+const KEPT: usize = 8;
+
+/// Why a request could not be answered.
+#[derive(Debug, thiserror::Error)]
+enum Fault {
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    #[error(transparent)]
+    Mount(#[from] camsim_core::mount::MountError),
+    #[error(transparent)]
+    Render(#[from] RenderError<Infallible>),
+    #[error("frame {0} was not rendered; move the timeline to try again")]
+    Missing(u64),
+}
+
+impl Fault {
+    /// After which nothing works on this device.
+    fn is_of_device(&self) -> bool {
+        matches!(self, Self::Render(RenderError::Gpu(GpuError::Device(_))))
+    }
+}
+
+/// Serves requests until the box is closed; opens the device anew after a loss, and tries again with each request where there is none.
+pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
+    let mut waiting = None;
+    loop {
+        let engine = match Engine::new(AdapterChoice::Best) {
+            Ok(engine) => engine,
+            Err(error) => {
+                speaker.say(Reply::Failed(error.to_string()));
+                waiting = mailbox.take();
+                if waiting.is_none() {
+                    return;
+                }
+                continue;
+            }
+        };
+        speaker.say(Reply::Adapter(engine.gpu().adapter.to_string()));
+        let mut worker = Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
+        loop {
+            let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
+            if let Err(fault) = worker.serve(&wanted, mailbox) {
+                speaker.say(Reply::Busy(String::new()));
+                speaker.say(Reply::Failed(fault.to_string()));
+                if fault.is_of_device() {
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// A picture that was made.
+struct Kept {
+    sequence: Arc<Sequence>,
+    stage: Stage,
+    size: Size,
+    picture: Arc<Picture>,
+}
+
+struct Worker<'a> {
+    engine: &'a Engine,
+    speaker: &'a Speaker,
+    library: &'a Library,
+    session: Option<Session<'a>>,
+    kept: Vec<Kept>,
+    /// Frames rendered so far.
+    rendered: u64,
+}
+
+impl Worker<'_> {
+    fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
+        let (begun, before) = (Instant::now(), self.rendered);
+        let loaded = self.library.load(wanted, self.speaker)?;
+        let sequence = &loaded.sequence;
+        let frame = wanted.frame.min(sequence.frames.saturating_sub(1));
+        let mut pictures = Vec::new();
+        for &stage in &wanted.stages {
+            // A preview is finished in any case: in a long drag somebody always wants something newer.
+            if wanted.size == Size::Full && !pictures.is_empty() && mailbox.is_newer() {
+                return Ok(());
+            }
+            pictures.push(self.picture(sequence, stage, wanted.size, frame)?);
+        }
+        let truth = if wanted.truth { Some(Arc::new(self.truth(sequence, wanted.size, frame)?)) } else { None };
+        let difference = match (wanted.gain, pictures.as_slice()) {
+            (Some(gain), [a, b]) => difference(a.frame.size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain).map(Arc::new),
+            _ => None,
+        };
+        let took = (self.rendered > before).then(|| begun.elapsed());
+        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, difference, took };
+        self.speaker.say(Reply::Frame(Box::new(reply)));
+        Ok(())
+    }
+
+    fn picture(&mut self, sequence: &Arc<Sequence>, stage: Stage, size: Size, frame: u64) -> Result<Arc<Picture>, Fault> {
+        let same = |kept: &Kept| {
+            Arc::ptr_eq(&kept.sequence, sequence) && (kept.stage, kept.size) == (stage, size) && kept.picture.frame.index == frame
+        };
+        if let Some(kept) = self.kept.iter().find(|kept| same(kept)) {
+            return Ok(kept.picture.clone());
+        }
+        let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
+        let Finished { frame, plan, times, .. } = done;
+        let image = screen(frame.size_px, &frame.color_rgba);
+        let picture = Arc::new(Picture { stage, frame, plan, times, image });
+        if self.kept.len() >= KEPT {
+            self.kept.remove(0);
+        }
+        self.kept.push(Kept { sequence: sequence.clone(), stage, size, picture: picture.clone() });
+        Ok(picture)
+    }
+
+    fn truth(&mut self, sequence: &Arc<Sequence>, size: Size, frame: u64) -> Result<Truth, Fault> {
+        let done = self.render(&variant(sequence, Stage::Photometric, size)?, &[Channel::Color, Channel::Depth], frame)?;
+        let depth_m = done.frame.depth_m.unwrap_or_default();
+        let image = depth_image(done.frame.size_px, &depth_m);
+        Ok(Truth { depth_m, image })
+    }
+
+    /// One frame, by the session that there is.
+    fn render(&mut self, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Result<Finished, Fault> {
+        let session = match &mut self.session {
+            Some(session) => {
+                let planner = session.planner();
+                let truth = channels.contains(&Channel::Depth);
+                if !same_frames(planner.sequence(), sequence) || planner.wants_truth() != truth {
+                    session.renew::<Infallible>(sequence.clone(), channels)?;
+                }
+                session
+            }
+            none => {
+                self.speaker.say(Reply::Busy("preparing the device".into()));
+                let session = self.engine.session::<Infallible>(sequence.clone(), channels)?;
+                self.speaker.say(Reply::Busy(String::new()));
+                none.insert(session)
+            }
+        };
+        let mut done = None;
+        let mut keep = |finished| {
+            done = Some(finished);
+            Ok(())
+        };
+        session.render::<Infallible>([frame], &mut keep)?;
+        self.rendered += 1;
+        done.ok_or(Fault::Missing(frame))
+    }
+}
+
+/// The sequence of a stage: what is loaded is shared, only the camera differs.
+fn variant(sequence: &Arc<Sequence>, stage: Stage, size: Size) -> Result<Arc<Sequence>, Fault> {
+    let mut scenario = staged(&sequence.scenario, stage);
+    if size == Size::Preview {
+        scenario = preview(&scenario);
+    }
+    if scenario == sequence.scenario {
+        return Ok(sequence.clone());
+    }
+    let mut variant = Sequence::clone(sequence);
+    if scenario.camera.mount != sequence.scenario.camera.mount {
+        variant.path = Arc::new(CameraPath::new(sequence.path.trajectory.clone(), &scenario.camera.mount)?);
+    }
+    if scenario.camera.photometric.vignette.is_none() {
+        variant.vignette = None;
+    }
+    variant.scenario = scenario;
+    Ok(Arc::new(variant))
+}
+
+/// Whether two sequences have the same frames: the same scenario, made of the same files as they were read.
+fn same_frames(a: &Sequence, b: &Sequence) -> bool {
+    let same_vignette = match (&a.vignette, &b.vignette) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (None, None) => true,
+        _ => false,
+    };
+    same_vignette
+        && Arc::ptr_eq(&a.scene, &b.scene)
+        && Arc::ptr_eq(&a.path.trajectory, &b.path.trajectory)
+        && a.zoom_track == b.zoom_track
+        && a.scenario == b.scenario
+}

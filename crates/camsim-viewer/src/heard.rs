@@ -1,0 +1,175 @@
+//! What the engine has said: the last pictures with their textures, what is loaded, what went wrong.
+
+use std::sync::Arc;
+
+use camsim_core::{plan::FramePlan, reference::Oracle, sequence::Sequence};
+use camsim_io::load::Loaded;
+use eframe::egui::{self, ColorImage, TextureFilter, TextureHandle, TextureOptions};
+
+use crate::engine::{Difference, ExactPicture, FrameReply, Picture, Reply, Size, Stage};
+
+/// All that panes know of the engine.
+#[derive(Default)]
+pub struct Heard {
+    /// What is rendered on.
+    pub adapter: String,
+    /// What takes long; empty for nothing.
+    pub busy: String,
+    /// The last scenario whose files were read.
+    pub loaded: Option<Arc<Loaded>>,
+    /// The last pictures.
+    pub shown: Option<Shown>,
+    /// For looks into single pixels.
+    pub looks: Option<Arc<Oracle>>,
+    /// The oracle's picture.
+    pub exact: Option<Exact>,
+    /// What went wrong last; gone with the next picture.
+    pub fault: Option<String>,
+    /// Time of the last frame in full size, ms.
+    pub full_ms: Option<f64>,
+    /// Time of the last preview, ms.
+    pub preview_ms: Option<f64>,
+    /// Counts up with each reply that panes may have kept something of.
+    pub replies: u64,
+}
+
+/// The engine's last pictures.
+pub struct Shown {
+    /// As they came.
+    pub reply: FrameReply,
+    /// The same on egui's device.
+    pub textures: Vec<TextureHandle>,
+    /// The difference there.
+    pub difference: Option<TextureHandle>,
+    /// The depth there.
+    pub depth: Option<TextureHandle>,
+}
+
+/// The oracle's picture, as far as it has come.
+pub struct Exact {
+    /// As it came.
+    pub picture: ExactPicture,
+    /// On egui's device.
+    pub texture: TextureHandle,
+    /// The difference there.
+    pub difference: Option<TextureHandle>,
+}
+
+/// One picture to look at.
+#[derive(Clone, Copy)]
+pub struct Sight<'a> {
+    /// On egui's device.
+    pub texture: &'a TextureHandle,
+    /// Pixels of the texture.
+    pub size_px: [u32; 2],
+    /// Linear R G B A.
+    pub color_rgba: &'a [f32],
+    /// What is in it.
+    pub stage: Stage,
+    /// How it was made; the oracle has no plan.
+    pub plan: Option<&'a FramePlan>,
+}
+
+impl Heard {
+    /// Takes a reply in.
+    pub fn take(&mut self, reply: Reply, context: &egui::Context) {
+        self.replies += 1;
+        match reply {
+            Reply::Adapter(adapter) => self.adapter = adapter,
+            Reply::Busy(what) => self.busy = what,
+            Reply::Loaded(loaded) => self.loaded = Some(loaded),
+            Reply::Looks(looks) => self.looks = Some(looks),
+            Reply::Failed(fault) => self.fault = Some(fault),
+            Reply::Frame(reply) => {
+                if let Some(took) = reply.took {
+                    let of_size = match reply.wanted.size {
+                        Size::Full => &mut self.full_ms,
+                        Size::Preview => &mut self.preview_ms,
+                    };
+                    *of_size = Some(1e3 * took.as_secs_f64());
+                }
+                self.fault = None;
+                self.shown = Some(Shown::new(*reply, self.shown.take(), context));
+            }
+            Reply::Exact(picture) => {
+                let (old, old_difference) = self.exact.take().map_or((None, None), |exact| (Some(exact.texture), exact.difference));
+                let texture = upload(context, "oracle", &picture.image, old);
+                let difference = picture.difference.as_ref().map(|d| upload(context, "oracle difference", &d.image, old_difference));
+                self.exact = Some(Exact { picture: *picture, texture, difference });
+            }
+        }
+    }
+
+    /// The sequence that is loaded.
+    pub fn sequence(&self) -> Option<&Arc<Sequence>> {
+        self.loaded.as_ref().map(|loaded| &loaded.sequence)
+    }
+
+    /// The picture of a stage, of the frame that is shown.
+    pub fn sight(&self, stage: Stage) -> Option<Sight<'_>> {
+        let shown = self.shown.as_ref()?;
+        if stage == Stage::Oracle {
+            let Exact { picture, texture, .. } = self.current_exact()?;
+            let size_px = picture.sequence.scenario.camera.size_px;
+            return Some(Sight { texture, size_px, color_rgba: &picture.color_rgba, stage, plan: None });
+        }
+        let at = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
+        let (picture, texture) = (shown.reply.pictures.get(at)?, shown.textures.get(at)?);
+        let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
+        Some(Sight { texture, size_px, color_rgba, stage, plan: Some(&picture.plan) })
+    }
+
+    /// The first picture of the last reply.
+    pub fn picture(&self) -> Option<&Arc<Picture>> {
+        self.shown.as_ref().and_then(|shown| shown.reply.pictures.first())
+    }
+
+    /// The oracle's picture, if it is of the frame shown.
+    pub fn current_exact(&self) -> Option<&Exact> {
+        let (exact, shown) = (self.exact.as_ref()?, self.shown.as_ref()?);
+        (self.is_current(&exact.picture.sequence) && exact.picture.frame == shown.reply.frame).then_some(exact)
+    }
+
+    /// Looks into the frame shown.
+    pub fn current_looks(&self) -> Option<&Arc<Oracle>> {
+        self.looks.as_ref().filter(|looks| self.is_current(looks.sequence()))
+    }
+
+    /// The difference on show: with the oracle or between two rendered pictures.
+    pub fn difference(&self, with_oracle: bool) -> Option<(&Arc<Difference>, &TextureHandle)> {
+        if with_oracle {
+            let exact = self.current_exact()?;
+            return exact.picture.difference.as_ref().zip(exact.difference.as_ref());
+        }
+        let shown = self.shown.as_ref()?;
+        shown.reply.difference.as_ref().zip(shown.difference.as_ref())
+    }
+
+    fn is_current(&self, sequence: &Arc<Sequence>) -> bool {
+        self.sequence().is_some_and(|current| Arc::ptr_eq(current, sequence))
+    }
+}
+
+impl Shown {
+    fn new(reply: FrameReply, before: Option<Self>, context: &egui::Context) -> Self {
+        let (old, old_difference, old_depth) =
+            before.map_or((Vec::new(), None, None), |before| (before.textures, before.difference, before.depth));
+        let mut old = old.into_iter();
+        let textures = reply.pictures.iter().map(|picture| upload(context, "picture", &picture.image, old.next())).collect();
+        let difference = reply.difference.as_ref().map(|difference| upload(context, "difference", &difference.image, old_difference));
+        let depth = reply.truth.as_ref().map(|truth| upload(context, "depth", &truth.image, old_depth));
+        Self { reply, textures, difference, depth }
+    }
+}
+
+/// Into a texture that is no longer needed, if there is one. Pixels stay pixels when enlarged.
+fn upload(context: &egui::Context, name: &str, image: &ColorImage, old: Option<TextureHandle>) -> TextureHandle {
+    let options = TextureOptions { magnification: TextureFilter::Nearest, minification: TextureFilter::Linear, ..TextureOptions::LINEAR };
+    match old {
+        Some(mut texture) => {
+            texture.set(image.clone(), options);
+            texture
+        }
+        None => context.load_texture(name, image.clone(), options),
+    }
+}

@@ -1,0 +1,73 @@
+//! Panes: small files that draw from the state and say what they wish. None of them touches the device or waits for anything.
+
+mod export;
+mod image_view;
+mod inspector;
+mod map;
+mod menu;
+mod notices;
+mod parameters;
+mod plan;
+mod plots;
+pub mod shortcuts;
+mod timeline;
+mod widgets;
+
+use eframe::egui;
+
+use crate::{
+    message::{Message, Outbox},
+    state::State,
+    view::Tab,
+};
+
+/// All panes.
+pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
+    // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass on a software adapter.
+    let style = ui.global_style();
+    let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
+    egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
+    egui::Panel::bottom("timeline").frame(panel).show(ui, |ui| timeline::show(ui, state, out));
+    egui::Panel::left("parameters")
+        .frame(panel)
+        .resizable(true)
+        .default_size(300.0)
+        .size_range(180.0..=600.0)
+        .show(ui, |ui| parameters::show(ui, state, out));
+    egui::Panel::right("pages")
+        .frame(panel)
+        .resizable(true)
+        .default_size(330.0)
+        .size_range(220.0..=700.0)
+        .show(ui, |ui| pages(ui, state, out));
+    egui::CentralPanel::default().frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT)).show(ui, |ui| {
+        notices::show(ui, state, out);
+        image_view::show(ui, state, out);
+    });
+    menu::windows(ui.ctx(), state, out);
+    shortcuts::window(ui.ctx(), state, out);
+}
+
+fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
+    ui.horizontal_wrapped(|ui| {
+        for tab in Tab::ALL {
+            if ui.selectable_label(state.view.tab == tab, tab.label()).clicked() {
+                out.push(Message::Tab(tab));
+            }
+        }
+    });
+    ui.separator();
+    egui::ScrollArea::vertical().id_salt(state.view.tab.label()).auto_shrink(false).show(ui, |ui| match state.view.tab {
+        Tab::Pixel => inspector::show(ui, state, out),
+        Tab::Plan => plan::show(ui, state),
+        Tab::Plots => plots::show(ui, state, out),
+        Tab::Map => map::show(ui, state, out),
+        Tab::Export => export::show(ui, state, out),
+    });
+}
+
+/// From dark blue (0) to yellow (1).
+fn ramp_color(share: f64) -> egui::Color32 {
+    let [r, g, b] = crate::engine::ramp(share);
+    egui::Color32::from_rgb(r, g, b)
+}

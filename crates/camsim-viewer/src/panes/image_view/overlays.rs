@@ -1,0 +1,140 @@
+//! What is drawn over a picture.
+
+use camsim_core::camera::CameraModel;
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, pos2};
+use glam::DVec2;
+
+use super::canvas::Placement;
+use crate::{engine::Stage, heard::Sight, motion, panes::ramp_color, state::State};
+
+/// Times that the predicted error is enlarged.
+const ERROR_SCALE: f64 = 200.0;
+/// Times that ways are enlarged: most are of a pixel.
+const MOTION_SCALE: f64 = 8.0;
+/// Circles of the predicted error across the picture.
+const CIRCLES: [u32; 2] = [12, 9];
+/// Lines of the distortion grid over the picture's width, and points of each.
+const GRID_LINES: i32 = 16;
+const GRID_POINTS: i32 = 96;
+
+/// All that the view asks for.
+pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &Sight<'_>) {
+    let overlays = state.view.overlays;
+    let Some(sequence) = state.heard.sequence() else { return };
+    if overlays.grid
+        && let Ok(camera) = lens_of(state, sight.stage)
+    {
+        grid(painter, placement, &camera);
+    }
+    if overlays.motion && sight.stage >= Stage::Time {
+        motion_paths(painter, placement, state);
+    }
+    if overlays.rows && sight.stage >= Stage::Time {
+        row_times(painter, placement, &sequence.scenario.camera);
+    }
+    if overlays.error
+        && let Some(plan) = sight.plan
+    {
+        // A preview's pixels are larger.
+        let factor = f64::from(placement.size_px[0]) / f64::from(sight.size_px[0].max(1));
+        errors(painter, placement, factor * plan.predicted.total_px);
+    }
+}
+
+fn lens_of(state: &State, stage: Stage) -> Result<CameraModel, camsim_core::camera::CameraError> {
+    let camera = match &state.document {
+        Some(document) => crate::engine::staged(&document.scenario, stage).camera,
+        None => camsim_core::scenario::CameraSpec::default(),
+    };
+    let zoom = state.heard.picture().and_then(|picture| picture.plan.zoom);
+    zoom.map_or_else(|| CameraModel::from_spec(&camera), |zoom| CameraModel::at_zoom(&camera, zoom))
+}
+
+/// Lines of equal u and v, as far as the lens has an answer there.
+fn grid(painter: &Painter, placement: &Placement, camera: &CameraModel) {
+    let [width, height] = camera.size_px.map(f64::from);
+    let step = width / camera.focal_px.x / f64::from(GRID_LINES);
+    // Barrel lenses show rays far beyond the frame of a pinhole.
+    let reach = GRID_LINES;
+    let ratio = f64::from(2 * reach) / f64::from(GRID_POINTS);
+    let stroke = Stroke::new(1.0, Color32::from_rgba_unmultiplied(255, 220, 60, 150));
+    for line in -reach..=reach {
+        for upright in [true, false] {
+            let fixed = f64::from(line) * step;
+            let mut run: Vec<Pos2> = Vec::new();
+            for point in 0..=GRID_POINTS {
+                let along = (f64::from(point) * ratio - f64::from(reach)) * step;
+                let uv = if upright { DVec2::new(fixed, along) } else { DVec2::new(along, fixed) };
+                let pixel = camera.project(uv);
+                let near = pixel.x > -width && pixel.x < 2.0 * width && pixel.y > -height && pixel.y < 2.0 * height;
+                if near && camera.lens.contains(uv) {
+                    run.push(placement.screen(pixel.x, pixel.y));
+                } else {
+                    painter.add(Shape::line(std::mem::take(&mut run), stroke));
+                }
+            }
+            painter.add(Shape::line(run, stroke));
+        }
+    }
+}
+
+/// Arrows from where things would be at the stamp to where they are, and their ways over the exposure.
+fn motion_paths(painter: &Painter, placement: &Placement, state: &State) {
+    let (Some(looks), Some(shown)) = (state.heard.current_looks(), &state.heard.shown) else { return };
+    let paths = motion::paths(looks, shown.reply.frame);
+    let (of_shift, of_blur) = (Stroke::new(1.0, Color32::from_rgb(80, 200, 255)), Stroke::new(2.0, Color32::from_rgb(255, 120, 60)));
+    for path in paths.iter() {
+        let screen = |place: DVec2| {
+            let place = path.pixel + MOTION_SCALE * (place - path.pixel);
+            placement.screen(place.x, place.y)
+        };
+        if let Some(at_stamp) = path.at_stamp_px {
+            painter.line_segment([screen(at_stamp), screen(path.pixel)], of_shift);
+        }
+        painter.circle_filled(screen(path.pixel), 1.5, of_shift.color);
+        painter.add(Shape::line(path.exposure_px.iter().map(|place| screen(*place)).collect(), of_blur));
+    }
+}
+
+/// A strip at the left border, with its scale.
+fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::scenario::CameraSpec) {
+    let Ok(shutter) = camsim_core::shutter::Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px) else { return };
+    let [width, height] = camera.size_px;
+    let mids: Vec<f64> = (0..height).map(|y| shutter.dt_pixel_s(width / 2, y)).collect();
+    let (first_s, last_s) = mids.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
+    let left = placement.rect().left().max(placement.pane.left());
+    let step = (height / 240).max(1);
+    for y in (0..height).step_by(step as usize) {
+        let t_s = mids.get(y as usize).copied().unwrap_or_default();
+        let share = if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 };
+        let (top, bottom) = (placement.screen(0.0, f64::from(y) - 0.5).y, placement.screen(0.0, f64::from(y + step) - 0.5).y);
+        painter.rect_filled(eframe::egui::Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
+    }
+    for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
+        let seen = placement.rect().intersect(placement.pane).shrink(7.0);
+        let at = pos2(left + 13.0, placement.screen(0.0, f64::from(y)).y.clamp(seen.top(), seen.bottom().max(seen.top())));
+        let text = format!("{:+.2} ms", 1e3 * mids.get(y as usize).copied().unwrap_or_default());
+        painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(11.0), Color32::WHITE);
+    }
+}
+
+fn errors(painter: &Painter, placement: &Placement, error_px: f64) {
+    let radius = (ERROR_SCALE * error_px) as f32 * placement.scale;
+    let stroke = Stroke::new(1.0, Color32::from_rgb(255, 90, 200));
+    let [width, height] = placement.size_px.map(f64::from);
+    for y in 0..CIRCLES[1] {
+        for x in 0..CIRCLES[0] {
+            let at = placement
+                .screen(width * (f64::from(x) + 0.5) / f64::from(CIRCLES[0]), height * (f64::from(y) + 0.5) / f64::from(CIRCLES[1]));
+            painter.circle_stroke(at, radius, stroke);
+        }
+    }
+    let at = placement.rect().intersect(placement.pane).left_bottom();
+    painter.text(
+        pos2(at.x + 6.0, at.y - 4.0),
+        Align2::LEFT_BOTTOM,
+        format!("99 % of the pixels within {error_px:.4} px"),
+        FontId::proportional(12.0),
+        stroke.color,
+    );
+}

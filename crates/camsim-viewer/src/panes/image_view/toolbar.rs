@@ -1,0 +1,85 @@
+//! What is shown, and how.
+
+use eframe::egui::{self, Role, Ui};
+
+use super::canvas;
+use crate::{
+    engine::Stage,
+    message::{Message, Outbox},
+    panes::widgets::{choice, named},
+    state::State,
+    view::{Compare, View},
+};
+
+/// Lines above the picture.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    let mut view = state.view.clone();
+    ui.horizontal_wrapped(|ui| {
+        for compare in Compare::ALL {
+            choice(ui, view.compare == compare, compare.label(), compare.label(), "how A and B are held against each other")
+                .clicked()
+                .then(|| view.compare = compare);
+        }
+        if view.compare == Compare::Difference {
+            let gain = ui.add(egui::Slider::new(&mut view.gain, 1.0..=64.0).logarithmic(true).prefix("x").max_decimals(1));
+            named(&gain, Role::Slider, "gain");
+        }
+        ui.separator();
+        zoom(ui, state, &mut view);
+    });
+    ui.horizontal_wrapped(|ui| {
+        stages(ui, "A", &mut view.a);
+        if view.compare != Compare::Single {
+            ui.separator();
+            stages(ui, "B", &mut view.b);
+        }
+        ui.separator();
+        overlays(ui, &mut view);
+    });
+    if view != state.view {
+        out.push(Message::View(view));
+    }
+}
+
+fn stages(ui: &mut Ui, name: &str, of: &mut Stage) {
+    ui.strong(name);
+    for stage in Stage::ALL {
+        let full = format!("{name}: {}", stage.label());
+        if choice(ui, *of == stage, stage.label(), &full, stage.explanation()).clicked() {
+            *of = stage;
+        }
+    }
+}
+
+fn zoom(ui: &mut Ui, state: &State, view: &mut View) {
+    let size_px = state.document.as_ref().map_or([640, 480], |document| document.scenario.camera.size_px);
+    let current = view.zoom.unwrap_or_else(|| canvas::fitting(ui.ctx().content_rect().size() * 0.5, size_px));
+    if ui.selectable_label(view.zoom.is_none(), "fit").on_hover_text("the whole picture (F)").clicked() {
+        view.zoom = None;
+    }
+    if ui.selectable_label(view.zoom == Some(1.0), "1:1").on_hover_text("one point of the screen a pixel (1)").clicked() {
+        *view = canvas::zoomed_in_place(view, 1.0, 1.0);
+    }
+    for (text, name, factor) in [("-", "zoom out", 0.5), ("+", "zoom in", 2.0)] {
+        let button = ui.small_button(text).on_hover_text(name);
+        named(&button, Role::Button, name);
+        if button.clicked() {
+            *view = canvas::zoomed_in_place(view, current, factor);
+        }
+    }
+    ui.weak(view.zoom.map_or_else(|| "fitted".to_owned(), |scale| format!("{:.0} %", 100.0 * scale)));
+}
+
+fn overlays(ui: &mut Ui, view: &mut View) {
+    let over = &mut view.overlays;
+    ui.toggle_value(&mut over.invalid, "invalid")
+        .on_hover_text("pixels without a ray, or outside of every ideal frame, in the paper's red (I)");
+    ui.toggle_value(&mut over.grid, "grid").on_hover_text("lines of equal ideal ray: what the lens does to a square grid (G)");
+    ui.toggle_value(&mut over.motion, "motion").on_hover_text(
+        "8 times as large: from where each place would be at the stamp to where it is at its row's time (eq. 16, blue), and its way over the exposure (orange) (M)",
+    );
+    ui.toggle_value(&mut over.rows, "row times").on_hover_text("mid-exposure of each row after the stamp");
+    ui.toggle_value(&mut over.error, "predicted error")
+        .on_hover_text("circles of the bound on the source coordinate's error, 200 times as large");
+    ui.toggle_value(&mut over.depth, "depth").on_hover_text("planar depth in place of colour: near is bright");
+}

@@ -1,0 +1,171 @@
+//! The line at the top: files, steps, what is rendered on.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, Context, Role, Ui};
+
+use super::widgets::named;
+use crate::{
+    document::Document,
+    drop::PICTURE_USES,
+    message::{Message, Outbox, Question},
+    state::State,
+};
+
+/// The line.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    ui.horizontal_wrapped(|ui| {
+        if ui.button("Open").on_hover_text("a scenario (Ctrl O), or drop one on the window").clicked() {
+            out.push(Message::Ask(Some(open_question(state))));
+        }
+        ui.add_enabled_ui(state.document.is_some(), |ui| file_buttons(ui, state, out));
+        ui.separator();
+        let [can_undo, can_redo] = state.document.as_ref().map_or([false; 2], Document::steps);
+        if ui.add_enabled(can_undo, egui::Button::new("Undo")).on_hover_text("Ctrl Z").clicked() {
+            out.push(Message::Undo);
+        }
+        if ui.add_enabled(can_redo, egui::Button::new("Redo")).on_hover_text("Ctrl Shift Z").clicked() {
+            out.push(Message::Redo);
+        }
+        ui.separator();
+        let dark = ui.visuals().dark_mode;
+        if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("colours of the window").clicked() {
+            ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
+        }
+        if ui.button("?").on_hover_text("keyboard shortcuts").clicked() {
+            out.push(Message::Help(!state.help));
+        }
+        ui.separator();
+        status(ui, state);
+    });
+}
+
+fn file_buttons(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    let Some(document) = &state.document else {
+        ui.label("nothing open");
+        return;
+    };
+    if ui.button("Save").on_hover_text("under a name of your choice (Ctrl S)").clicked() {
+        out.push(Message::Ask(Some(save_question(document))));
+    }
+    if ui.button("Reload").on_hover_text("read log, terrain and pictures again").clicked() {
+        out.push(Message::Reload);
+    }
+    ui.menu_button("Copy", |ui| {
+        if ui.button("as TOML").clicked() {
+            out.push(Message::CopyToml);
+        }
+        if ui.button("as command line").clicked() {
+            out.push(Message::CopyCommand);
+        }
+    });
+}
+
+fn status(ui: &mut Ui, state: &State) {
+    if let Some(document) = &state.document {
+        let name =
+            document.path.file_name().map_or_else(|| document.path.display().to_string(), |name| name.to_string_lossy().into_owned());
+        let mark = if document.is_unsaved() { " (changed)" } else { "" };
+        ui.label(format!("{name}{mark}")).on_hover_text(document.path.display().to_string());
+    }
+    let time = |what: &str, ms: Option<f64>| ms.map(|ms| format!("{what} {ms:.0} ms"));
+    let times: Vec<String> = [time("frame", state.heard.full_ms), time("preview", state.heard.preview_ms)].into_iter().flatten().collect();
+    ui.weak(times.join(", ")).on_hover_text(format!("rendered on {}", state.heard.adapter));
+}
+
+/// Asks for what to open; begins in the folder of what is open.
+pub fn open_question(state: &State) -> Question {
+    let folder =
+        state.document.as_ref().and_then(|document| document.path.parent()).map_or(String::new(), |folder| folder.display().to_string());
+    Question { saves: false, path: folder }
+}
+
+/// Asks where to save.
+pub fn save_question(document: &Document) -> Question {
+    Question { saves: true, path: document.path.display().to_string() }
+}
+
+/// Windows of this pane.
+pub fn windows(context: &Context, state: &State, out: &mut Outbox) {
+    if let Some(question) = &state.question {
+        ask(context, question, &state.recent, out);
+    }
+    if let Some(path) = &state.dropped_picture {
+        egui::Modal::new(egui::Id::unique("dropped picture")).show(context, |ui| {
+            ui.label(format!("Use {} as", path.display()));
+            for (what, key) in PICTURE_USES {
+                if ui.button(what).on_hover_text(key).clicked() {
+                    out.push(Message::UsePicture(Some(key)));
+                }
+            }
+            if ui.button("nothing").clicked() {
+                out.push(Message::UsePicture(None));
+            }
+        });
+    }
+}
+
+fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Outbox) {
+    let mut path = question.path.clone();
+    let (mut done, mut open) = (false, true);
+    let title = if question.saves { "Save scenario" } else { "Open scenario" };
+    let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
+        ui.heading(title);
+        let edit = ui.add(egui::TextEdit::singleline(&mut path).desired_width(460.0).hint_text("path of a .toml file"));
+        named(&edit, Role::TextInput, "path");
+        if !edit.has_focus() && !edit.lost_focus() {
+            edit.request_focus();
+        }
+        done = edit.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if !question.saves {
+            entries(ui, &mut path, &mut done);
+            for file in recent {
+                if ui.link(file.display().to_string()).clicked() {
+                    path = file.display().to_string();
+                    done = true;
+                }
+            }
+        }
+        ui.horizontal(|ui| {
+            done |= ui.button(if question.saves { "Save here" } else { "Open this" }).clicked();
+            open = !ui.button("Cancel").clicked();
+        });
+    });
+    if done && !path.is_empty() {
+        out.push(if question.saves { Message::Save(path.into()) } else { Message::Open(path.into()) });
+    } else if !open || modal.should_close() {
+        out.push(Message::Ask(None));
+    } else if path != question.path {
+        out.push(Message::Ask(Some(Question { path, ..question.clone() })));
+    }
+}
+
+/// Folders and scenarios in the folder that is typed.
+fn entries(ui: &mut Ui, path: &mut String, done: &mut bool) {
+    let typed = PathBuf::from(&*path);
+    let folder = if typed.is_dir() { Some(typed.clone()) } else { typed.parent().map(PathBuf::from) };
+    let Some(folder) = folder.filter(|folder| folder.is_dir()) else { return };
+    let mut found: Vec<(bool, PathBuf)> = std::fs::read_dir(&folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| (entry.path().is_dir(), entry.path()))
+        .filter(|(is_folder, path)| *is_folder || path.extension().is_some_and(|ending| ending == "toml"))
+        .collect();
+    found.sort();
+    found.reverse();
+    egui::ScrollArea::vertical().max_height(200.0).show(ui, |ui| {
+        if let Some(parent) = folder.parent().filter(|_| ui.selectable_label(false, "..").on_hover_text("the folder above").clicked()) {
+            *path = parent.display().to_string();
+        }
+        found.sort_by(|a, b| (b.0, &a.1).cmp(&(a.0, &b.1)));
+        for (is_folder, entry) in found {
+            let name = entry.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let shown = if is_folder { format!("{name}/") } else { name };
+            if ui.selectable_label(entry == typed, shown).clicked() {
+                *path = entry.display().to_string();
+                *done = !is_folder;
+            }
+        }
+    });
+}

@@ -1,0 +1,122 @@
+//! The whole scenario, grouped as in its file.
+
+mod editors;
+mod lists;
+mod presets;
+
+use std::sync::LazyLock;
+
+use camsim_io::scenario_file::{Kind, keys};
+use eframe::egui::{self, RichText, Role, Ui};
+
+use super::widgets::named;
+use crate::{
+    document::Document,
+    message::{Message, Outbox},
+    params::{self, Param},
+    state::State,
+};
+
+/// The pane.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    let Some(document) = &state.document else {
+        ui.label("nothing open");
+        return;
+    };
+    presets::show(ui, out);
+    egui::ScrollArea::vertical().id_salt("parameters").auto_shrink(false).show(ui, |ui| {
+        for group in groups() {
+            section(ui, document, group, out);
+        }
+    });
+}
+
+/// Keys of each table in the order of the format, without those of list elements; found once.
+fn groups() -> &'static [Group] {
+    static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
+        let mut groups: Vec<Group> = Vec::new();
+        for (key, kind) in keys().iter().filter(|(key, kind)| *kind != Kind::Later && !is_element(key)) {
+            let name = key.rsplit_once('.').map_or("", |(group, _)| group);
+            match groups.iter_mut().find(|group| group.name == name) {
+                Some(group) => group.keys.push((*key, *kind)),
+                None => groups.push(Group { name, keys: vec![(*key, *kind)] }),
+            }
+        }
+        groups
+    });
+    &GROUPS
+}
+
+/// Whether a key is of the elements of a list.
+fn is_element(key: &str) -> bool {
+    keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')))
+}
+
+/// A table of the format.
+struct Group {
+    name: &'static str,
+    keys: Vec<(&'static str, Kind)>,
+}
+
+fn section(ui: &mut Ui, document: &Document, group: &Group, out: &mut Outbox) {
+    let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
+    let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
+    let group_name = group.name;
+    let name = if group_name.is_empty() { "general" } else { group_name };
+    let mut title = RichText::new(name).strong();
+    if wrong {
+        title = title.color(ui.visuals().error_fg_color);
+    } else if changed {
+        title = title.color(ui.visuals().hyperlink_color);
+    }
+    let open = matches!(group_name, "camera.lens" | "camera.shutter" | "camera.photometric");
+    egui::CollapsingHeader::new(title).id_salt(group_name).default_open(open).show(ui, |ui| {
+        for (key, kind) in &group.keys {
+            match kind {
+                Kind::Tables => lists::show(ui, document, key, out),
+                kind => row(ui, document, key, *kind, out),
+            }
+        }
+    });
+}
+
+/// A key: its name, its value, its unit; what was changed can be reset.
+fn row(ui: &mut Ui, document: &Document, key: &str, kind: Kind, out: &mut Outbox) {
+    let Some(param) = params::of(key) else { return };
+    row_at(ui, document, key, kind, param, out);
+}
+
+/// The same for an element of a list, whose key has an index that its facts have not.
+fn row_at(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+    let leaf = key.rsplit('.').next().unwrap_or(key);
+    let changed = document.is_changed(key);
+    let problem = document.problem(key);
+    let mut text = RichText::new(leaf);
+    if problem.is_some() {
+        text = text.color(ui.visuals().error_fg_color);
+    } else if changed {
+        text = text.color(ui.visuals().hyperlink_color).strong();
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.label(text).on_hover_text(format!("{key}: {}", param.tip));
+        editors::show(ui, document, key, kind, param, out);
+        if !param.unit.is_empty() {
+            ui.weak(param.unit);
+        }
+        if changed {
+            let name = format!("reset {key}");
+            let reset = ui.small_button("reset").on_hover_text(format!("{name} to {}", opened(document, key)));
+            named(&reset, Role::Button, &name);
+            if reset.clicked() {
+                out.push(Message::Reset(key.to_owned()));
+            }
+        }
+    });
+    if let Some(problem) = problem {
+        ui.label(RichText::new(&problem.message).color(ui.visuals().error_fg_color).small());
+    }
+}
+
+fn opened(document: &Document, key: &str) -> String {
+    document.opened(key).map_or_else(|| "nothing".to_owned(), ToString::to_string)
+}

@@ -1,0 +1,224 @@
+//! An editor for each kind of value.
+
+use camsim_io::scenario_file::Kind;
+use eframe::egui::{self, Response, Role, Ui};
+use toml::Value;
+
+use super::super::widgets::named;
+use crate::{
+    document::Document,
+    message::{Message, Outbox},
+    params::Param,
+};
+
+/// What a pass over an editor asks for.
+struct Edit {
+    value: Option<Value>,
+    ongoing: bool,
+}
+
+/// The editor of a key.
+pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+    let value = document.value(key);
+    let edit = match kind {
+        Kind::Number => number(ui, key, value, param, false, out),
+        Kind::Whole | Kind::Within(..) => number(ui, key, value, param, true, out),
+        Kind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
+        Kind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
+        Kind::Numbers(count) => optional(ui, key, value, document, param, count, out),
+        Kind::Counts(count, _) => numbers(ui, key, value, param, count, true, out),
+        Kind::NumbersOr(count, word) => numbers_or(ui, key, value, param, count, word, out),
+        Kind::NumberList => list(ui, key, value, param, out),
+        Kind::Path => path(ui, key, value),
+        Kind::Word(words) => word(ui, key, value, words),
+        Kind::Words(words) => several(ui, key, value, words),
+        Kind::Tables | Kind::Later => None,
+    };
+    if let Some(Edit { value, ongoing }) = edit {
+        out.push(Message::Set(key.to_owned(), value, ongoing));
+    }
+}
+
+fn once(value: Value) -> Option<Edit> {
+    Some(Edit { value: Some(value), ongoing: false })
+}
+
+fn as_f64(value: &Value) -> f64 {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).unwrap_or_default()
+}
+
+/// A value to drag or to type.
+fn drag(ui: &mut Ui, name: &str, value: f64, param: &Param, whole: bool, out: &mut Outbox) -> Option<(f64, bool)> {
+    let mut changed = value;
+    let [low, high] = param.range;
+    let mut editor = egui::DragValue::new(&mut changed).speed(param.speed).range(low..=high).clamp_existing_to_range(false);
+    editor = if whole { editor.max_decimals(0) } else { editor.max_decimals(7) };
+    let response = ui.add(editor).on_hover_text(format!(
+        "{}{}",
+        param.tip,
+        if param.unit.is_empty() { String::new() } else { format!(" ({})", param.unit) }
+    ));
+    named(&response, Role::SpinButton, name);
+    end_of(&response, out);
+    (response.changed() && changed != value).then(|| (changed, response.dragged()))
+}
+
+/// A hand that lets go ends what counts as one step.
+fn end_of(response: &Response, out: &mut Outbox) {
+    if response.drag_stopped() {
+        out.push(Message::EndGesture);
+    }
+}
+
+fn to_value(number: f64, whole: bool) -> Value {
+    if whole { Value::Integer(number.round() as i64) } else { Value::Float(number) }
+}
+
+fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: bool, out: &mut Outbox) -> Option<Edit> {
+    let Some(value) = value else {
+        let add = ui.button("set").on_hover_text(param.tip);
+        named(&add, Role::Button, &format!("set {key}"));
+        return add.clicked().then(|| to_value(first_value(param), whole)).and_then(once);
+    };
+    let edit =
+        drag(ui, key, as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
+    if matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg") && remove(ui, key) {
+        return Some(Edit { value: None, ongoing: false });
+    }
+    edit
+}
+
+fn first_value(param: &Param) -> f64 {
+    if param.key == "scene.fog_visibility_m" { 10_000.0 } else { 0.0_f64.clamp(param.range[0], param.range[1]) }
+}
+
+fn remove(ui: &mut Ui, key: &str) -> bool {
+    let name = format!("leave out {key}");
+    let button = ui.small_button("x").on_hover_text(&name);
+    named(&button, Role::Button, &name);
+    button.clicked()
+}
+
+fn number_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, words: &[&str], whole: bool, out: &mut Outbox) -> Option<Edit> {
+    let value = value?;
+    for word in words {
+        let is_word = value.as_str() == Some(word);
+        let response = ui.selectable_label(is_word, *word).on_hover_text(param.tip);
+        named(&response, Role::Button, &format!("{key}: {word}"));
+        if response.clicked() {
+            return if is_word { once(to_value(first_value(param).max(1.0), whole)) } else { once(Value::String((*word).into())) };
+        }
+    }
+    if value.is_str() { None } else { number(ui, key, Some(value), param, whole, out) }
+}
+
+fn numbers(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, count: usize, whole: bool, out: &mut Outbox) -> Option<Edit> {
+    let array = value?.as_array()?;
+    let mut edit = None;
+    for (at, element) in array.iter().take(count).enumerate() {
+        if let Some((number, ongoing)) = drag(ui, &format!("{key}[{at}]"), as_f64(element), param, whole, out) {
+            let mut changed = array.clone();
+            changed[at] = to_value(number, whole);
+            edit = Some(Edit { value: Some(Value::Array(changed)), ongoing });
+        }
+    }
+    edit
+}
+
+/// Numbers that may be left out.
+fn optional(
+    ui: &mut Ui,
+    key: &str,
+    value: Option<&Value>,
+    document: &Document,
+    param: &Param,
+    count: usize,
+    out: &mut Outbox,
+) -> Option<Edit> {
+    let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"));
+    if value.is_some() {
+        let edit = numbers(ui, key, value, param, count, false, out);
+        return if may_be_left_out && remove(ui, key) { Some(Edit { value: None, ongoing: false }) } else { edit };
+    }
+    let add = ui.button("set").on_hover_text(param.tip);
+    named(&add, Role::Button, &format!("set {key}"));
+    let camera = &document.scenario.camera;
+    let start = match key.rsplit('.').next() {
+        Some("principal_point_px") => camera.size_px.map(|side| 0.5 * (f64::from(side) - 1.0)).to_vec(),
+        Some("window_s") => vec![0.0, 10.0],
+        _ => vec![0.0; count],
+    };
+    add.clicked().then(|| Value::Array(start.into_iter().map(Value::Float).collect())).and_then(once)
+}
+
+fn numbers_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, count: usize, word: &str, out: &mut Outbox) -> Option<Edit> {
+    let is_word = value.is_some_and(Value::is_str);
+    let response = ui.selectable_label(is_word, word).on_hover_text(param.tip);
+    named(&response, Role::Button, &format!("{key}: {word}"));
+    if response.clicked() {
+        return once(if is_word { Value::Array(vec![Value::Float(0.0); count]) } else { Value::String(word.into()) });
+    }
+    if is_word { None } else { numbers(ui, key, value, param, count, false, out) }
+}
+
+/// As many numbers as one likes.
+fn list(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, out: &mut Outbox) -> Option<Edit> {
+    let array = value?.as_array()?;
+    let mut edit = numbers(ui, key, value, param, array.len(), false, out);
+    let (more, less) = (ui.small_button("+").on_hover_text("one more"), ui.small_button("-").on_hover_text("one less"));
+    named(&more, Role::Button, &format!("one more of {key}"));
+    named(&less, Role::Button, &format!("one less of {key}"));
+    let mut changed = array.clone();
+    if more.clicked() {
+        changed.push(Value::Float(0.0));
+        edit = once(Value::Array(changed));
+    } else if less.clicked() && changed.pop().is_some() {
+        edit = once(Value::Array(changed));
+    }
+    edit
+}
+
+/// A path is taken when it has been typed to the end: half a path is no file.
+fn path(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
+    let present = value.and_then(Value::as_str).unwrap_or_default();
+    let id = egui::Id::unique(("path", key));
+    let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
+    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).on_hover_text(present);
+    named(&response, Role::TextInput, key);
+    if response.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, text));
+        return None;
+    }
+    ui.data_mut(|data| data.remove::<String>(id));
+    if !response.lost_focus() || text == present {
+        return None;
+    }
+    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), ongoing: false })
+}
+
+fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
+    let mut chosen = value.and_then(Value::as_str).unwrap_or_default().to_owned();
+    let before = chosen.clone();
+    let combo = egui::ComboBox::from_id_salt(key).selected_text(&chosen).show_ui(ui, |ui| {
+        for word in words {
+            ui.selectable_value(&mut chosen, (*word).to_owned(), *word);
+        }
+    });
+    named(&combo.response, Role::ComboBox, key);
+    (chosen != before).then_some(Value::String(chosen)).and_then(once)
+}
+
+fn several(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {
+    let array = value?.as_array()?;
+    let mut edit = None;
+    for word in words {
+        let mut on = array.iter().any(|element| element.as_str() == Some(word));
+        let response = ui.toggle_value(&mut on, *word);
+        named(&response, Role::Button, &format!("{key}: {word}"));
+        if response.clicked() {
+            let kept = words.iter().filter(|other| if *other == word { on } else { array.iter().any(|e| e.as_str() == Some(other)) });
+            edit = once(Value::Array(kept.map(|word| Value::String((*word).into())).collect()));
+        }
+    }
+    edit
+}

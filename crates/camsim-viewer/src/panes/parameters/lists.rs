@@ -1,0 +1,65 @@
+//! Lists of tables: vibration, zoom calibrations.
+
+use camsim_io::scenario_file::keys;
+use eframe::egui::{Role, Ui};
+use toml::{Table, Value};
+
+use super::super::widgets::named;
+use super::row_at;
+use crate::{
+    document::Document,
+    message::{Message, Outbox},
+    params,
+};
+
+/// A list with its entries, one below the other.
+pub fn show(ui: &mut Ui, document: &Document, key: &str, out: &mut Outbox) {
+    let entries = document.value(key).and_then(Value::as_array).map_or(0, Vec::len);
+    let leaf = key.rsplit('.').next().unwrap_or(key);
+    for at in 0..entries {
+        ui.horizontal(|ui| {
+            ui.label(format!("{leaf} {}", at + 1));
+            let name = format!("remove {key} {}", at + 1);
+            let remove = ui.small_button("x").on_hover_text(&name);
+            named(&remove, Role::Button, &name);
+            if remove.clicked() {
+                out.push(Message::Set(format!("{key}.{at}"), None, false));
+            }
+        });
+        ui.indent((key, at), |ui| {
+            for (element, kind) in keys() {
+                let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else { continue };
+                if let Some(param) = params::of(element) {
+                    row_at(ui, document, &format!("{key}.{at}.{field}"), *kind, param, out);
+                }
+            }
+        });
+    }
+    let tip = params::of(key).map_or("", |param| param.tip);
+    let add = ui.button(format!("add {leaf}")).on_hover_text(tip);
+    if add.clicked() {
+        let mut list = document.value(key).and_then(Value::as_array).cloned().unwrap_or_default();
+        list.push(Value::Table(fresh(document, key)));
+        out.push(Message::Set(key.to_owned(), Some(Value::Array(list)), false));
+    }
+}
+
+/// A new entry: a little shaking of the pitch, or the camera as it is one zoom further.
+fn fresh(document: &Document, key: &str) -> Table {
+    let mut table = Table::new();
+    let mut put = |name: &str, value: Value| table.insert(name.to_owned(), value);
+    if key == "camera.zoom" {
+        let camera = &document.scenario.camera;
+        let floats = |values: &[f64]| Value::Array(values.iter().map(|value| Value::Float(*value)).collect());
+        put("at", Value::Float(camera.zoom.last().map_or(1.0, |entry| entry.at + 1.0)));
+        put("focal_px", floats(&camera.focal_px));
+        put("coefficients", floats(&camera.lens.coefficients));
+    } else {
+        put("axis", Value::String("pitch".into()));
+        put("amplitude_deg", Value::Float(0.05));
+        put("amplitude_m", Value::Float(0.0));
+        put("hz", Value::Float(30.0));
+        put("phase_deg", Value::Float(0.0));
+    }
+    table
+}

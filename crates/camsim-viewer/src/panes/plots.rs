@@ -1,0 +1,61 @@
+//! The flight over time: log against tracker, speeds, blur and row skew. The cursor is the timeline's; a click jumps.
+
+use std::sync::Arc;
+
+use eframe::egui::{self, Color32, Ui};
+use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, VLine};
+
+use crate::{
+    message::{Message, Outbox},
+    series::{Channel, Series},
+    state::State,
+};
+
+/// The page.
+pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    let Some(loaded) = &state.heard.loaded else {
+        ui.label("no flight yet");
+        return;
+    };
+    let id = egui::Id::unique("plot series");
+    let known = ui.data(|data| data.get_temp::<Arc<Series>>(id)).filter(|series| series.is_of(loaded));
+    let series = known.unwrap_or_else(|| {
+        let series = Arc::new(Series::new(loaded));
+        ui.data_mut(|data| data.insert_temp(id, series.clone()));
+        series
+    });
+    let cursor_s = series.start_s + state.timeline.seconds(state.timeline.frame);
+    for channel in &series.channels {
+        plot(ui, state, channel, cursor_s, series.start_s, out);
+    }
+}
+
+fn plot(ui: &mut Ui, state: &State, channel: &Channel, cursor_s: f64, start_s: f64, out: &mut Outbox) {
+    ui.horizontal(|ui| {
+        ui.strong(channel.name);
+        ui.weak(&channel.note);
+    });
+    let plot = Plot::new(channel.name)
+        .height(110.0)
+        .show_x(true)
+        .allow_scroll(false)
+        .link_axis(egui::Id::unique("flight time"), [true, false])
+        .link_cursor(egui::Id::unique("flight time"), [true, false]);
+    let plot = if channel.lines.len() > 1 { plot.legend(Legend::default().position(Corner::LeftTop).background_alpha(0.5)) } else { plot };
+    let colors = [Color32::from_rgb(150, 150, 150), Color32::from_rgb(90, 180, 250), Color32::from_rgb(250, 150, 60)];
+    let shown = plot.show(ui, |ui| {
+        for ((name, points), color) in channel.lines.iter().zip(colors) {
+            ui.line(Line::new(*name, PlotPoints::new(points.clone())).color(color));
+        }
+        if let Some(limit) = channel.limit {
+            ui.hline(HLine::new("", limit).color(Color32::from_rgb(220, 70, 60)));
+        }
+        ui.vline(VLine::new("", cursor_s).color(Color32::WHITE));
+        ui.pointer_coordinate()
+    });
+    if shown.response.clicked()
+        && let Some(at) = shown.inner
+    {
+        out.push(Message::Seek(state.timeline.frame_at(at.x - start_s)));
+    }
+}

@@ -1,0 +1,165 @@
+//! Numbers over the flight, for plots.
+
+use std::sync::{Arc, Weak};
+
+use camsim_io::load::Loaded;
+use glam::{DQuat, EulerRot};
+
+/// Instants of a line: more than a plot has points across.
+const POINTS: u64 = 800;
+
+/// What is plotted, over path time.
+#[derive(Clone, Debug)]
+pub struct Series {
+    of: Weak<Loaded>,
+    /// Path time of the window's beginning.
+    pub start_s: f64,
+    /// One plot each.
+    pub channels: Vec<Channel>,
+}
+
+/// A plot.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    /// What, with its unit.
+    pub name: &'static str,
+    /// What there is to say beside it.
+    pub note: String,
+    /// Lines with their names, `[t_s, value]`.
+    pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
+    /// What may not be exceeded.
+    pub limit: Option<f64>,
+}
+
+impl Series {
+    /// Over the window of a scenario.
+    pub fn new(loaded: &Arc<Loaded>) -> Self {
+        let sequence = &loaded.sequence;
+        let span_s = sequence.frames.max(2) as f64 / sequence.scenario.camera.fps;
+        let times: Vec<f64> = (0..=POINTS).map(|k| sequence.start_s + span_s * k as f64 / POINTS as f64).collect();
+        let over = |value: &dyn Fn(f64) -> f64| times.iter().map(|&t_s| [t_s, value(t_s)]).collect::<Vec<_>>();
+        let state = |t_s: f64| sequence.path.trajectory.state(t_s);
+        let (limits, camera) = (&loaded.tracked.limits, &sequence.scenario.camera);
+        let mut channels = Vec::new();
+        for (axis, name) in ["north, m", "east, m", "down, m"].into_iter().enumerate() {
+            let of_log = over(&|t_s| loaded.log.interpolate(t_s).0[axis]);
+            let tracked = over(&|t_s| state(t_s).position_ned_m[axis]);
+            channels.push(against_log(name, "m", of_log, tracked));
+        }
+        for (axis, name) in ["roll, deg", "pitch, deg", "yaw, deg"].into_iter().enumerate() {
+            let of_log = continuous(over(&|t_s| euler_deg(loaded.log.interpolate(t_s).1)[axis]));
+            let tracked = continuous(over(&|t_s| euler_deg(state(t_s).ned_from_body)[axis]));
+            channels.push(against_log(name, "deg", of_log, tracked));
+        }
+        let mut plain = |name: &'static str, points: Vec<[f64; 2]>, limit: Option<f64>| {
+            let largest = points.iter().map(|point| point[1]).fold(0.0, f64::max);
+            channels.push(Channel { name, note: format!("up to {largest:.3}"), lines: vec![(name, points)], limit });
+        };
+        let spec = &sequence.scenario.tracker;
+        plain("speed, m/s", over(&|t_s| state(t_s).velocity_ned_m_s.length()), Some(limits.max_speed_m_s));
+        plain("acceleration, m/s2", over(&|t_s| state(t_s).acceleration_ned_m_s2.length()), Some(spec.max_acceleration_m_s2));
+        let rate_limit = limits.max_angular_rate_rad_s.to_degrees();
+        plain("body rate, deg/s", over(&|t_s| state(t_s).rate_body_rad_s.length().to_degrees()), Some(rate_limit));
+        let focal_px = 0.5 * (camera.focal_px[0] + camera.focal_px[1]);
+        let (exposure_s, readout_s) = (1e-3 * camera.shutter.exposure_ms, 1e-3 * camera.shutter.readout_ms);
+        let image_speed = |t_s: f64| image_speed_px_s(loaded, focal_px, t_s);
+        plain("blur in the middle, px", over(&|t_s| image_speed(t_s) * exposure_s), None);
+        plain("row skew in the middle, px", over(&|t_s| image_speed(t_s) * readout_s), None);
+        Self { of: Arc::downgrade(loaded), start_s: sequence.start_s, channels }
+    }
+
+    /// Whether it is of this.
+    pub fn is_of(&self, loaded: &Arc<Loaded>) -> bool {
+        std::ptr::eq(self.of.as_ptr(), Arc::as_ptr(loaded))
+    }
+}
+
+fn against_log(name: &'static str, unit: &str, of_log: Vec<[f64; 2]>, tracked: Vec<[f64; 2]>) -> Channel {
+    let wrap = |error: f64| if unit == "deg" { error - 360.0 * (error / 360.0).round() } else { error };
+    let errors = of_log.iter().zip(&tracked).map(|(log, tracked)| wrap(log[1] - tracked[1]).abs());
+    let (mut squares, mut largest, mut count) = (0.0, 0.0_f64, 0);
+    for error in errors {
+        squares += error * error;
+        largest = largest.max(error);
+        count += 1;
+    }
+    let rms = (squares / f64::from(count.max(1))).sqrt();
+    Channel {
+        name,
+        note: format!("error {rms:.3} {unit} RMS, {largest:.3} at most"),
+        lines: vec![("log", of_log), ("tracker", tracked)],
+        limit: None,
+    }
+}
+
+fn euler_deg(ned_from_body: DQuat) -> [f64; 3] {
+    let (yaw, pitch, roll) = ned_from_body.to_euler(EulerRot::ZYX);
+    [roll, pitch, yaw].map(f64::to_degrees)
+}
+
+/// Without the jumps of angles that wrap.
+fn continuous(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let mut turns = 0.0;
+    for at in 1..points.len() {
+        let step = points[at][1] + 360.0 * turns - points[at - 1][1];
+        turns -= (step / 360.0).round();
+        points[at][1] += 360.0 * turns;
+    }
+    points
+}
+
+/// How fast what the optical axis meets moves over the picture: by turning, and by moving past it at its distance.
+fn image_speed_px_s(loaded: &Loaded, focal_px: f64, t_s: f64) -> f64 {
+    let path = &loaded.sequence.path;
+    let (pose, rate) = (path.pose(t_s), path.rate_camera(t_s));
+    let axis_ned = pose.ned_from_camera * glam::DVec3::Z;
+    let velocity = pose.ned_from_camera.conjugate() * path.velocity_ned(t_s);
+    let terrain = loaded.sequence.scene.terrain.as_ref();
+    let depth_m = match terrain {
+        Some(terrain) => terrain.intersect(pose.position_ned_m, axis_ned, f64::INFINITY).map(|hit| hit.t),
+        None => Some(-pose.position_ned_m.z / axis_ned.z).filter(|t| *t > 0.0),
+    };
+    let inverse_m = depth_m.map_or(0.0, |depth_m| 1.0 / depth_m);
+    // Of the point (0, 0, z): d(x/z)/dt = -v_x / z - w_y, d(y/z)/dt = -v_y / z + w_x.
+    focal_px * (-velocity.x * inverse_m - rate.y).hypot(-velocity.y * inverse_m + rate.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::harness::demo;
+
+    fn loaded() -> Arc<Loaded> {
+        let scenario = camsim_io::scenario_file::read_scenario(&demo(), &[], None).expect("legal");
+        Arc::new(camsim_io::load::load_sequence(&scenario).expect("loaded"))
+    }
+
+    #[test]
+    fn image_speed_is_that_of_the_point_in_the_middle() {
+        let loaded = loaded();
+        let path = &loaded.sequence.path;
+        let terrain = loaded.sequence.scene.terrain.as_ref().expect("a terrain");
+        for t_s in [25.3, 27.0, 28.5] {
+            let pose = path.pose(t_s);
+            let axis = pose.ned_from_camera * glam::DVec3::Z;
+            let point = pose.position_ned_m + axis * terrain.intersect(pose.position_ned_m, axis, f64::INFINITY).expect("ground").t;
+            // Central difference of the fixed point's ideal coordinates.
+            let uv = |t_s: f64| {
+                let pose = path.pose(t_s);
+                let seen = pose.ned_from_camera.conjugate() * (point - pose.position_ned_m);
+                seen.truncate() / seen.z
+            };
+            let h = 1e-5;
+            let exact = 400.0 * (uv(t_s + h) - uv(t_s - h)).length() / (2.0 * h);
+            let found = image_speed_px_s(&loaded, 400.0, t_s);
+            assert!((found - exact).abs() < 1e-4 * exact, "{found} {exact} px/s at {t_s} s");
+        }
+    }
+
+    #[test]
+    fn angles_have_no_jumps() {
+        let wrapped = [170.0, 179.0, -172.0, -160.0, 175.0].iter().enumerate().map(|(k, v)| [k as f64, *v]).collect();
+        let values: Vec<f64> = continuous(wrapped).iter().map(|point| point[1]).collect();
+        assert_eq!(values, [170.0, 179.0, 188.0, 200.0, 175.0]);
+    }
+}

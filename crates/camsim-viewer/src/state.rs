@@ -1,0 +1,283 @@
+//! Everything that the window knows, and what a wish of a pane does to it.
+
+use std::{path::PathBuf, sync::Arc};
+
+use eframe::egui;
+
+use crate::{
+    document::Document,
+    drop,
+    engine::{ExactWanted, Picture, Reply, Size, Stage, Wanted},
+    export::{ExportJob, Exporter},
+    heard::Heard,
+    message::{Message, Question},
+    settings::Settings,
+    timeline::Timeline,
+    view::{Compare, View},
+};
+
+/// A hand rests when it has done nothing for so long, seconds.
+pub const REST_S: f64 = 0.2;
+/// In play, frames that take longer than this in full size are shown as previews, ms.
+const QUICK_MS: f64 = 60.0;
+/// Recent files that are remembered.
+const MOST_RECENT: usize = 8;
+
+/// The window's state.
+pub struct State {
+    /// The scenario, if one is open.
+    pub document: Option<Document>,
+    /// Which frame.
+    pub timeline: Timeline,
+    /// How it is shown.
+    pub view: View,
+    /// What the engine said.
+    pub heard: Heard,
+    /// Faults and news that nobody has dismissed.
+    pub notices: Vec<String>,
+    /// Pixel under the cursor.
+    pub hovered: Option<[u32; 2]>,
+    /// Pixel that is kept in the inspector.
+    pub pinned: Option<[u32; 2]>,
+    /// Whether the shortcuts are listed.
+    pub help: bool,
+    /// A path being asked for.
+    pub question: Option<Question>,
+    /// A dropped picture whose use is not yet known.
+    pub dropped_picture: Option<PathBuf>,
+    /// The last export.
+    pub export: Option<Arc<ExportJob>>,
+    /// Files opened lately, the last one first.
+    pub recent: Vec<PathBuf>,
+    exporter: Option<Exporter>,
+    /// egui's time now, and when a hand was at work last.
+    now_s: f64,
+    touched_s: f64,
+}
+
+impl State {
+    /// Nothing open yet.
+    pub fn new(settings: Settings, exporter: Option<Exporter>) -> Self {
+        Self {
+            document: None,
+            timeline: Timeline::default(),
+            view: settings.view,
+            heard: Heard::default(),
+            notices: Vec::new(),
+            hovered: None,
+            pinned: None,
+            help: false,
+            question: None,
+            dropped_picture: None,
+            export: None,
+            recent: settings.recent,
+            exporter,
+            now_s: 0.0,
+            touched_s: 0.0,
+        }
+    }
+
+    /// What is remembered for the next run.
+    pub fn settings(&self) -> Settings {
+        Settings { view: self.view.clone(), recent: self.recent.clone() }
+    }
+
+    /// Whether frames can be rendered to files.
+    pub fn can_export(&self) -> bool {
+        self.exporter.is_some()
+    }
+
+    /// Time goes on.
+    pub fn tick(&mut self, now_s: f64) {
+        let seconds = now_s - self.now_s;
+        self.now_s = now_s;
+        self.timeline.advance(seconds);
+    }
+
+    /// A hand is at work now.
+    pub fn touch(&mut self) {
+        self.touched_s = self.now_s;
+    }
+
+    /// Seconds until the hand counts as resting; `None` if it rests.
+    pub fn rests_in_s(&self) -> Option<f64> {
+        let left_s = self.touched_s + REST_S - self.now_s;
+        (left_s > 0.0).then_some(left_s)
+    }
+
+    /// Takes in what the engine said.
+    pub fn hear(&mut self, reply: Reply, context: &egui::Context) {
+        if self.is_out_of_date(&reply) {
+            return;
+        }
+        self.heard.take(reply, context);
+        if let Some(sequence) = self.heard.sequence() {
+            self.timeline.fit(sequence.frames, sequence.scenario.camera.fps);
+        }
+    }
+
+    /// Previews and full frames come from two threads: what the hand has left behind must not take the place of what it is at.
+    fn is_out_of_date(&self, reply: &Reply) -> bool {
+        match reply {
+            Reply::Loaded(loaded) => self.document.as_ref().is_none_or(|document| *document.scenario != loaded.sequence.scenario),
+            Reply::Frame(reply) => {
+                let (Some(wanted), Some(shown)) = (self.wanted(), &self.heard.shown) else { return false };
+                match reply.wanted.size {
+                    Size::Full => wanted.size == Size::Preview && Wanted { size: Size::Full, ..wanted } != reply.wanted,
+                    Size::Preview => shown.reply.wanted == wanted,
+                }
+            }
+            _ => false,
+        }
+    }
+
+    /// What is to be rendered now.
+    pub fn wanted(&self) -> Option<Wanted> {
+        let document = self.document.as_ref()?;
+        let stages = self.view.rendered_stages();
+        let compares = self.view.compare == Compare::Difference && stages.len() == 2;
+        let moving = self.timeline.dragged || self.rests_in_s().is_some();
+        let playing = self.timeline.playing && self.heard.full_ms.is_none_or(|ms| ms > QUICK_MS);
+        Some(Wanted {
+            scenario: document.scenario.clone(),
+            reading: document.reading,
+            frame: self.timeline.frame,
+            gain: compares.then_some(self.view.gain),
+            stages,
+            size: if moving || playing { Size::Preview } else { Size::Full },
+            truth: self.view.overlays.depth,
+        })
+    }
+
+    /// What the oracle is to do now: once a frame in full size is on show, looks into it; and its own picture if that is on show.
+    pub fn wanted_exact(&self) -> Option<ExactWanted> {
+        let (shown, sequence) = (self.heard.shown.as_ref()?, self.heard.sequence()?);
+        let rests = shown.reply.wanted.size == Size::Full && Some(&shown.reply.wanted) == self.wanted().as_ref();
+        rests.then(|| {
+            let other = self.view.stages().into_iter().find(|stage| *stage != Stage::Oracle);
+            let picture = other.and_then(|stage| shown.reply.pictures.iter().find(|picture: &&Arc<Picture>| picture.stage == stage));
+            let compares = self.view.compare == Compare::Difference && self.view.wants_oracle();
+            let against = picture.filter(|_| compares).map(|picture| (picture.clone(), self.view.gain));
+            ExactWanted { sequence: sequence.clone(), frame: self.view.wants_oracle().then_some(shown.reply.frame), against }
+        })
+    }
+
+    /// Does what a pane wishes. What only the window can do is left to it.
+    pub fn apply(&mut self, message: Message, context: &egui::Context) {
+        if self.apply_to_document(&message, context) {
+            self.touch();
+            return;
+        }
+        match message {
+            Message::Seek(frame) => {
+                self.timeline.seek(frame);
+                self.touch();
+            }
+            Message::Step(by) => {
+                self.timeline.step(by);
+                self.touch();
+            }
+            Message::TogglePlay => self.timeline.toggle(),
+            Message::Timeline(timeline) => self.timeline = timeline,
+            Message::View(view) => self.view = view,
+            Message::Tab(tab) => self.view.tab = tab,
+            Message::Hover(pixel) => self.hovered = pixel,
+            Message::Pin(pixel) => self.pinned = pixel,
+            Message::Dismiss(at) if at < self.notices.len() => {
+                self.notices.remove(at);
+            }
+            Message::Help(open) => self.help = open,
+            Message::Ask(question) => self.question = question,
+            Message::Export(wish) => {
+                if let (Some(document), Some(exporter)) = (&self.document, &self.exporter) {
+                    let scenario = (*document.scenario).clone();
+                    self.export = Some(ExportJob::start(exporter, scenario, wish.folder, wish.frames, context));
+                }
+            }
+            Message::CancelExport => {
+                if let Some(job) = &self.export {
+                    job.cancel();
+                }
+            }
+            Message::Open(path) => self.open(path),
+            Message::Drop(path) => drop::take(self, &path),
+            Message::UsePicture(key) => drop::use_picture(self, key),
+            _ => {}
+        }
+    }
+
+    /// Messages that change the document; whether this was one.
+    fn apply_to_document(&mut self, message: &Message, context: &egui::Context) -> bool {
+        let Some(document) = &mut self.document else { return false };
+        let told: Result<Option<String>, String> = match message {
+            Message::Set(key, value, ongoing) => {
+                document.set(key, value.clone(), *ongoing);
+                Ok(None)
+            }
+            Message::EndGesture => {
+                document.end_gesture();
+                Ok(None)
+            }
+            Message::Reset(key) => {
+                document.reset(key);
+                Ok(None)
+            }
+            Message::Camera(camera) => document.set_camera(camera).map(|()| None),
+            Message::Undo => {
+                document.undo();
+                Ok(None)
+            }
+            Message::Redo => {
+                document.redo();
+                Ok(None)
+            }
+            Message::Reload => {
+                document.reading += 1;
+                Ok(None)
+            }
+            Message::Save(path) => {
+                self.question = None;
+                document.save(path).map(|()| Some(format!("saved {}", path.display())))
+            }
+            Message::CopyToml => document.to_toml(None).map(|text| {
+                context.copy_text(text);
+                Some("the scenario is on the clipboard".into())
+            }),
+            Message::CopyCommand => {
+                context.copy_text(document.command_line());
+                Ok(Some("the command line is on the clipboard".into()))
+            }
+            _ => return false,
+        };
+        match told {
+            Ok(None) => {}
+            Ok(Some(text)) | Err(text) => self.notice(text),
+        }
+        true
+    }
+
+    /// Opens a scenario; what is open stays if it cannot be.
+    pub fn open(&mut self, path: PathBuf) {
+        self.question = None;
+        match Document::open(&path) {
+            Ok(mut document) => {
+                document.reading = self.document.as_ref().map_or(0, |before| before.reading + 1);
+                self.document = Some(document);
+                self.timeline = Timeline { speed: self.timeline.speed, ..Timeline::default() };
+                (self.pinned, self.hovered) = (None, None);
+                self.recent.retain(|known| *known != path);
+                self.recent.insert(0, path);
+                self.recent.truncate(MOST_RECENT);
+                self.touch();
+            }
+            Err(error) => self.notice(error),
+        }
+    }
+
+    /// Tells something until it is dismissed.
+    pub fn notice(&mut self, text: String) {
+        if self.notices.last() != Some(&text) {
+            self.notices.push(text);
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Parameters, steps, files.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use toml::Value;
+
+use super::harness::{Window, demo, has, shown};
+use crate::{engine::Size, message::Message};
+
+fn send(window: &mut Window, message: Message) {
+    let context = window.harness.ctx.clone();
+    window.state_mut().apply(message, &context);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn an_edit_gives_a_new_frame_and_undo_the_old_one() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let before = window.state().heard.picture().expect("a picture").frame.color_rgba.clone();
+    let key = "camera.shutter.exposure_ms";
+    window.harness.get_by_label(key).set_value_accesskit(30.0);
+    window.step();
+    window.step();
+    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 30.0);
+    assert!(has(&window, &format!("reset {key}")), "what is changed can be reset");
+    window.wait("a preview", |state| shown(state).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 30.0));
+    window.settle();
+    let after = window.state().heard.picture().expect("a picture");
+    assert_ne!(after.frame.color_rgba, before);
+    assert!(after.plan.motion.blur_px > 2.0, "{}", after.plan.motion.blur_px);
+    window.harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    window.step();
+    window.settle();
+    assert_eq!(window.state().heard.picture().expect("a picture").frame.color_rgba, before, "undone to the last bit");
+    window.click("Redo");
+    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 30.0);
+    window.click(&format!("reset {key}"));
+    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms, 8.0);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn what_is_not_legal_is_told_where_it_stands_and_the_picture_stays() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    send(&mut window, Message::Set("camera.shutter.exposure_ms".into(), Some(Value::Float(-1.0)), false));
+    window.step();
+    window.settle();
+    let problem = window.state().document.as_ref().expect("open").problems[0].message.clone();
+    assert!(window.harness.query_all_by_label(&problem).next().is_some(), "{problem}");
+    assert!(shown(window.state()).is_some_and(|wanted| wanted.scenario.camera.shutter.exposure_ms == 8.0 && wanted.size == Size::Full));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn saved_and_opened_again_it_is_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demo = camsim_io::builtin::unpack(folder.path()).expect("unpacked");
+    let mut window = Window::open(Some(demo));
+    window.settle();
+    send(&mut window, Message::Set("camera.lens.coefficients".into(), Some(Value::Array(vec![Value::Float(0.1)])), false));
+    let saved = folder.path().join("mine.toml");
+    window.click("Save");
+    window.harness.get_by_label("path").set_text_value_accesskit(&saved.display().to_string());
+    window.step();
+    window.click("Save here");
+    assert!(saved.is_file(), "{:?}", window.state().notices);
+    let scenario = window.state().document.as_ref().expect("open").scenario.clone();
+    send(&mut window, Message::Open(saved.clone()));
+    assert_eq!(window.state().document.as_ref().expect("open").scenario, scenario);
+    window.settle();
+    assert_eq!(window.state().recent[0], saved);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn dropped_files_find_their_place_and_bad_ones_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        let path: PathBuf = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        path
+    };
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let before = window.state().document.as_ref().expect("open").scenario.clone();
+    // Bad ones: told, and what is open stays.
+    for (name, text, told) in [
+        ("bad.toml", "[flight]\nlgo = \"x\"\n[scene]\n", "bad.toml:2"),
+        ("bad.yaml", "nonsense: [", "bad.yaml"),
+        ("picture.xyz", "", "picture.xyz"),
+    ] {
+        let path = write(name, text);
+        send(&mut window, Message::Drop(path));
+        let notice = window.state().notices.last().cloned().unwrap_or_default();
+        assert!(notice.contains(told), "{name}: {notice}");
+        assert_eq!(window.state().document.as_ref().expect("open").scenario, before, "{name}");
+    }
+    window.step();
+    let dismiss = format!("dismiss: {}", window.state().notices[0]);
+    let count = window.state().notices.len();
+    window.click(&dismiss);
+    assert_eq!(window.state().notices.len(), count - 1);
+    // A camera of camsim's own, and a log that is none: the engine says so, and the next good one is shown.
+    let camera = write("camera.toml", "size_px = [320, 240]\nfocal_px = [200.0, 200.0]\n");
+    send(&mut window, Message::Drop(camera));
+    assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.size_px, [320, 240], "{:?}", window.state().notices);
+    let log = write("empty.csv", "");
+    send(&mut window, Message::Drop(log));
+    window.wait("the fault", |state| state.heard.fault.as_deref().is_some_and(|fault| fault.contains("empty.csv")));
+    send(&mut window, Message::Undo);
+    window.settle();
+    assert!(window.state().heard.fault.is_none());
+    // A picture asks what it is for.
+    let vignette = demo().with_file_name("vignette.png");
+    send(&mut window, Message::Drop(vignette));
+    // A window is measured before it is shown.
+    (0..3).for_each(|_| window.step());
+    window.click("vignette map");
+    assert!(window.state().dropped_picture.is_none());
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn text_goes_to_the_clipboard() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    send(&mut window, Message::Set("camera.shutter.readout_ms".into(), Some(Value::Float(0.0)), false));
+    let copied = |window: &Window| {
+        window.harness.output().platform_output.commands.iter().find_map(|command| match command {
+            egui::OutputCommand::CopyText(text) => Some(text.clone()),
+            _ => None,
+        })
+    };
+    for (button, told) in [("as TOML", "readout_ms = 0.0"), ("as command line", "--set camera.shutter.readout_ms=0.0")] {
+        window.click("Copy");
+        window.harness.get_by_label(button).click();
+        let mut found = None;
+        for _ in 0..4 {
+            window.step();
+            found = found.or_else(|| copied(&window));
+        }
+        let text = found.unwrap_or_default();
+        assert!(text.contains(told), "{button}: {text}");
+    }
+}

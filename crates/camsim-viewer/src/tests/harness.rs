@@ -1,0 +1,164 @@
+//! A window without a screen.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::mpsc::{Receiver, channel},
+    time::{Duration, Instant},
+};
+
+use eframe::egui;
+use egui_kittest::{
+    Harness, SnapshotOptions,
+    kittest::{NodeT, Queryable},
+};
+
+use crate::{
+    app::Viewer,
+    engine::{Size, Wanted},
+    export::Exporter,
+    settings::Settings,
+    state::State,
+};
+
+/// Longest wait for a picture: debug builds on two busy processors are slow.
+const PATIENCE: Duration = Duration::from_secs(240);
+
+/// The built-in flight.
+pub fn demo() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/demo.toml")
+}
+
+/// A small flat scene with every effect, quick to render: the tests of panes need no mountains.
+pub fn pattern() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
+}
+
+/// A viewer and its window.
+pub struct Window {
+    pub harness: Harness<'static, Option<Viewer>>,
+    /// A word for each repaint that is asked for: by the engine with each reply.
+    repaints: Receiver<()>,
+}
+
+impl Window {
+    /// Of 1000 x 700 points, on a scenario.
+    pub fn open(scenario: Option<PathBuf>) -> Self {
+        Self::with(scenario, None, [1000.0, 700.0])
+    }
+
+    pub fn with(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2]) -> Self {
+        let mut start = Some((scenario, exporter));
+        let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
+            if let Some((scenario, exporter)) = start.take() {
+                *viewer = Some(Viewer::new(ui.ctx(), scenario, Settings::default(), exporter));
+            }
+            // What eframe does by clearing.
+            ui.painter().rect_filled(ui.ctx().content_rect(), 0.0, ui.visuals().panel_fill);
+            viewer.as_mut().expect("made in the first pass").show(ui);
+        };
+        let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
+        let harness = builder.wgpu().build_ui_state(show, None);
+        let (sender, repaints) = channel();
+        harness.ctx.set_request_repaint_callback(move |_| {
+            // The window may be gone.
+            let _ = sender.send(());
+        });
+        Self { harness, repaints }
+    }
+
+    pub fn state(&self) -> &State {
+        &self.harness.state().as_ref().expect("open").state
+    }
+
+    pub fn state_mut(&mut self) -> &mut State {
+        &mut self.harness.state_mut().as_mut().expect("open").state
+    }
+
+    pub fn step(&mut self) {
+        self.harness.step();
+    }
+
+    /// Lets the window run until something is so.
+    #[track_caller]
+    pub fn wait(&mut self, what: &str, mut is_so: impl FnMut(&State) -> bool) {
+        let begun = Instant::now();
+        while !is_so(self.state()) {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "{what}: not within {PATIENCE:?}; fault {:?}, notices {:?}",
+                self.state().heard.fault,
+                self.state().notices
+            );
+            self.step();
+            // Time goes on by the steps, too: that a hand rests is not told by a repaint.
+            let _ = self.repaints.recv_timeout(Duration::from_millis(5));
+        }
+        self.step();
+    }
+
+    /// Until what is wanted is on show, in full size.
+    #[track_caller]
+    pub fn settle(&mut self) {
+        self.wait("the full picture", |state| {
+            let wanted = state.wanted();
+            wanted.as_ref().is_some_and(|wanted| wanted.size == Size::Full) && shown(state) == wanted.as_ref()
+        });
+    }
+
+    /// Stops play, then as [`Window::settle`].
+    #[track_caller]
+    pub fn settle_stopped(&mut self) {
+        self.state_mut().timeline.playing = false;
+        self.settle();
+    }
+
+    /// Until the oracle answers for what is on show.
+    #[track_caller]
+    pub fn settle_exact(&mut self) {
+        self.settle();
+        self.wait("looks", |state| state.heard.current_looks().is_some());
+    }
+
+    #[track_caller]
+    pub fn click(&mut self, label: &str) {
+        self.harness.get_by_label(label).click();
+        // Pressed, let go, done, shown.
+        (0..3).for_each(|_| self.step());
+    }
+
+    /// What a screen would show.
+    pub fn picture(&mut self) -> image::RgbaImage {
+        self.harness.render().expect("rendered")
+    }
+
+    /// Holds a part of the window against its picture in `tests/snapshots`: what tells times, paths or noise is left out. Fonts and lines may
+    /// differ a little between drivers.
+    #[track_caller]
+    pub fn snapshot(&mut self, name: &str, part: egui::Rect) {
+        self.harness.check_accessibility();
+        let whole = self.picture();
+        let [x, y, width, height] = [part.left(), part.top(), part.width(), part.height()].map(|v| v.max(0.0).round() as u32);
+        let part = image::imageops::crop_imm(&whole, x, y, width, height).to_image();
+        let options = SnapshotOptions::new().threshold(1.5).max_failed_pixels(200_usize);
+        egui_kittest::image_snapshot_options(&part, name, &options);
+    }
+
+    /// The panel on the right, below its tabs.
+    pub fn page(&self) -> egui::Rect {
+        let tabs = self.harness.get_by_label("Export").rect();
+        egui::Rect::from_min_max(
+            egui::pos2(self.harness.get_by_label("picture").rect().right() + 12.0, tabs.bottom() + 6.0),
+            egui::pos2(984.0, 590.0),
+        )
+    }
+}
+
+/// What the pictures on show were made for.
+pub fn shown(state: &State) -> Option<&Wanted> {
+    state.heard.shown.as_ref().map(|shown| &shown.reply.wanted)
+}
+
+/// Whether a node of that name is there.
+pub fn has(window: &Window, label: &str) -> bool {
+    window.harness.query_all_by_label(label).next().is_some_and(|node| !node.accesskit_node().is_hidden())
+}

@@ -1,0 +1,184 @@
+//! The pages on the right, the shortcuts, and windows in odd states.
+
+use std::sync::{Arc, Mutex, mpsc::channel};
+
+use camsim_core::{camera::CameraModel, shutter::Shutter};
+use eframe::egui::{self, Key};
+use egui_kittest::kittest::Queryable;
+use glam::DVec2;
+
+use super::harness::{Window, demo, has, pattern};
+use crate::{message::Message, motion, view::Tab};
+
+fn send(window: &mut Window, message: Message) {
+    let context = window.harness.ctx.clone();
+    window.state_mut().apply(message, &context);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_inspector_tells_what_the_pixel_sees() {
+    let mut window = Window::open(Some(demo()));
+    window.settle_exact();
+    let pixel = [300, 400];
+    send(&mut window, Message::Pin(Some(pixel)));
+    window.step();
+    // From the formulas of the paper, by hand: eqs. 8 and 9 for the lens, section 6 for the row's time.
+    let scenario = window.state().document.as_ref().expect("open").scenario.clone();
+    let camera = CameraModel::from_spec(&scenario.camera).expect("a camera");
+    let uv = camera.unproject(DVec2::new(300.0, 400.0)).expect("a ray");
+    assert!(has(&window, &format!("{:.6}, {:.6}", uv.x, uv.y)), "the ray");
+    let shutter = Shutter::from_spec(&scenario.camera.shutter, scenario.camera.fps, scenario.camera.size_px).expect("a shutter");
+    assert!(has(&window, &format!("{:+.4} ms", 1e3 * shutter.dt_line_s(400))), "the row's time");
+    assert!(has(&window, "terrain"));
+    let [r, g, b, a] = window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
+    assert_eq!(a, 255);
+    assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
+    window.harness.key_press(Key::Escape);
+    window.step();
+    assert_eq!(window.state().pinned, None);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn motion_paths_end_where_the_pixel_is() {
+    let mut window = Window::open(Some(demo()));
+    window.settle_exact();
+    let looks = Arc::clone(window.state().heard.current_looks().expect("looks"));
+    let paths = motion::paths(&looks, 0);
+    assert!(paths.len() > 100, "{}", paths.len());
+    for path in paths.iter() {
+        // The middle of the exposure is the pixel's own instant.
+        let middle = path.exposure_px[path.exposure_px.len() / 2];
+        assert!(middle.distance(path.pixel) < 1e-6, "{middle} {}", path.pixel);
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn plan_plots_map_and_export_have_what_they_should() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    window.click("Plan");
+    assert!(has(&window, "- readback"), "the last pass");
+    assert!(has(&window, "predicted error"));
+    window.click("Plots");
+    window.step();
+    assert!(has(&window, "speed, m/s"));
+    window.snapshot("plots", window.page().with_max_y(330.0));
+    window.click("Map");
+    window.step();
+    let map = window.harness.get_by_label("map: click to jump").rect();
+    window.snapshot("map", egui::Rect::from_center_size(map.center(), egui::vec2(170.0, 150.0)));
+    window.click("map: click to jump");
+    assert_eq!(window.state().view.tab, Tab::Map);
+    window.settle();
+    window.click("Export");
+    assert!(has(&window, "this window was opened without a renderer to files; use `camsim render`"));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn an_export_shows_progress_and_can_be_cancelled() {
+    // Renders a frame for each word.
+    let (word, words) = channel::<()>();
+    let words = Mutex::new(words);
+    let exporter: crate::Exporter = Arc::new(move |job| {
+        for _ in job.frames[0]..job.frames[1] {
+            let _ = words.lock().expect("one export at a time").recv();
+            if !job.tick() {
+                return Err("stopped on request".into());
+            }
+        }
+        Ok("all written".into())
+    });
+    let mut window = Window::with(Some(pattern()), Some(exporter), [1000.0, 700.0]);
+    window.settle();
+    window.click("Export");
+    window.click("Render");
+    (0..3).for_each(|_| word.send(()).expect("the exporter listens"));
+    window.wait("progress", |state| state.export.as_ref().is_some_and(|job| job.progress().done == 3));
+    window.click("Cancel");
+    drop(word);
+    window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
+    assert!(has(&window, "stopped on request"));
+    window.click("Render");
+    window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
+    assert!(has(&window, "all written"));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn shortcuts_are_listed_and_colours_change() {
+    let mut window = Window::open(Some(pattern()));
+    window.settle();
+    window.click("?");
+    assert!(has(&window, "play or stop"));
+    let list = window.harness.get_by_label("play or stop").rect();
+    let part = egui::Rect::from_center_size(list.center(), egui::vec2(320.0, 200.0));
+    window.snapshot("shortcuts", part);
+    window.harness.key_press(Key::Escape);
+    window.step();
+    assert!(!window.state().help);
+    window.click("Light");
+    assert!(!window.harness.ctx.global_style().visuals.dark_mode);
+    let part = window.harness.get_by_label("timeline").rect().expand2(egui::vec2(0.0, 36.0));
+    window.snapshot("light", part);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn small_large_and_minimised_windows_behave() {
+    let mut window = Window::open(Some(pattern()));
+    window.settle();
+    for size in [[60.0, 40.0], [480.0, 320.0], [1.0, 1.0], [2500.0, 1400.0], [1000.0, 700.0]] {
+        window.harness.set_size(egui::Vec2::from(size));
+        window.step();
+        window.step();
+    }
+    // A minimised window gets no passes; the clock then jumps, and play goes on from where it was.
+    window.click("play");
+    let before = window.state().timeline.frame;
+    window.state_mut().tick(1e4);
+    assert!(window.state().timeline.frame <= before + 31);
+    window.settle_stopped();
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn nothing_open_and_a_log_of_ten_hours() {
+    let mut window = Window::open(None);
+    window.step();
+    assert!(has(&window, "nothing open"));
+    let folder = tempfile::tempdir().expect("a folder");
+    camsim_io::builtin::unpack(folder.path()).expect("unpacked");
+    let mut log = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
+    for second in 0..36_000 {
+        let angle = f64::from(second) * 0.01;
+        // With a gap of a minute.
+        if !(5_000..5_060).contains(&second) {
+            log += &format!(
+                "{second},{:.3},{:.3},-500,0,0,{:.3}\n",
+                900.0 * angle.cos(),
+                900.0 * angle.sin(),
+                (angle.to_degrees() + 90.0) % 360.0
+            );
+        }
+    }
+    std::fs::write(folder.path().join("long.csv"), log).expect("written");
+    let pattern = std::fs::read_to_string(folder.path().join("pattern.toml")).expect("text");
+    let mut table: toml::Table = pattern.parse().expect("toml");
+    table["flight"] = toml::Value::Table("log = \"long.csv\"\nformat = \"csv-ned\"".parse().expect("toml"));
+    let path = folder.path().join("long.toml");
+    std::fs::write(&path, table.to_string()).expect("written");
+    send(&mut window, Message::Open(path));
+    window.settle();
+    assert!(window.state().timeline.frames > 1_000_000, "{:?}", window.state().timeline);
+    send(&mut window, Message::Seek(900_000));
+    window.settle();
+    for tab in ["Plots", "Map", "Pixel"] {
+        window.click(tab);
+        window.step();
+    }
+    assert_eq!(window.state().heard.shown.as_ref().expect("shown").reply.frame, 900_000);
+}

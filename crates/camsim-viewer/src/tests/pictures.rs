@@ -1,0 +1,152 @@
+//! What is on show.
+
+use std::{convert::Infallible, sync::Arc};
+
+use camsim_gpu::{AdapterChoice, Engine};
+use camsim_io::{load::load_sequence, scenario_file::read_scenario, write::write_picture};
+use eframe::egui;
+use egui_kittest::kittest::Queryable;
+
+use super::harness::{Window, demo, pattern};
+use crate::{
+    engine::Stage,
+    view::{Compare, Overlays, View},
+};
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_picture_on_show_is_what_render_writes() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    window.state_mut().timeline.seek(17);
+    window.settle();
+    let of_view = window.state().heard.picture().expect("a picture").image.clone();
+
+    let scenario = read_scenario(&demo(), &[], None).expect("legal");
+    let sequence = load_sequence(&scenario).expect("loaded").sequence;
+    let engine = Engine::new(AdapterChoice::Best).expect("an adapter");
+    let mut session = engine.session::<Infallible>(Arc::clone(&sequence), &scenario.output.channels).expect("a session");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("frame.png");
+    let mut write = |finished: camsim_gpu::engine::Finished| {
+        write_picture(&path, &finished.frame, scenario.camera.photometric.output).expect("written");
+        Ok(())
+    };
+    session.render::<Infallible>([17], &mut write).expect("rendered");
+    let written = image::open(&path).expect("a picture").to_rgba8();
+    assert_eq!(of_view.size, [written.width() as usize, written.height() as usize]);
+    for (place, (shown, written)) in of_view.pixels.iter().zip(written.pixels()).enumerate() {
+        assert_eq!(shown.to_array(), written.0, "pixel {place}");
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn at_one_point_a_pixel_the_screen_has_the_pictures_own_codes() {
+    let mut window = Window::with(Some(pattern()), None, [1600.0, 1000.0]);
+    window.settle();
+    window.click("1:1");
+    // The middle of the picture on the middle of the pane may lie between two points of the screen.
+    let rect = window.harness.get_by_label("picture").rect();
+    let image = window.state().heard.picture().expect("a picture").image.clone();
+    let [width, height] = image.size;
+    let screen = window.picture();
+    let origin = rect.center() - egui::vec2(width as f32, height as f32) * 0.5;
+    assert!(rect.width() >= 64.0 && rect.height() >= 64.0);
+    let (mut same, mut all) = (0, 0);
+    for y in 0..40 {
+        for x in 0..40 {
+            let (px, py) = (width / 2 - 20 + x, height / 2 - 20 + y);
+            let at = [origin.x + px as f32 + 0.5, origin.y + py as f32 + 0.5].map(|v| v.floor() as u32);
+            all += 1;
+            same += u32::from(screen.get_pixel(at[0], at[1]).0[..3] == image.pixels[py * width + px].to_array()[..3]);
+        }
+    }
+    assert_eq!(same, all, "pixels with the codes of the picture");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn stages_can_be_wiped_and_subtracted() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    window.click("wipe");
+    window.click("B: + lens");
+    window.settle();
+    assert_eq!(window.state().view.stages(), [Stage::Photometric, Stage::Lens]);
+    let pair = &window.state().heard.shown.as_ref().expect("shown").reply.pictures;
+    assert_eq!(pair.len(), 2);
+    assert_ne!(pair[0].frame.color_rgba, pair[1].frame.color_rgba);
+    // Noise and vignette are in A alone.
+    assert!(pair[1].plan.skipped.iter().any(|skip| skip.what == "noise"));
+    assert!(!pair[0].plan.skipped.iter().any(|skip| skip.what == "noise"));
+    window.click("A: ideal");
+    window.click("difference");
+    window.settle();
+    let (difference, _) = window.state().heard.difference(false).expect("a difference");
+    assert!(difference.rms_dn > 1.0, "a lens moves the picture: {}", difference.rms_dn);
+    window.click("side by side");
+    window.settle();
+    let picture = window.picture();
+    let pane = window.harness.get_by_label("picture").rect();
+    let row = (pane.center().y + 20.0) as u32;
+    let halves = [pane.left() + 20.0, pane.center().x + 20.0].map(|x| picture.get_pixel(x as u32, row).0);
+    assert_ne!(halves[0], halves[1], "two pictures");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
+    let mut window = Window::open(Some(pattern()));
+    window.settle_exact();
+    let plain = window.picture();
+    let overlays = Overlays { invalid: true, grid: true, motion: true, rows: true, error: true, depth: false };
+    for (name, only) in [
+        ("grid", Overlays { grid: true, ..Overlays::default() }),
+        ("motion", Overlays { motion: true, ..Overlays::default() }),
+        ("rows", Overlays { rows: true, ..Overlays::default() }),
+        ("error", Overlays { error: true, ..Overlays::default() }),
+    ] {
+        window.state_mut().view.overlays = only;
+        window.step();
+        assert_ne!(window.picture(), plain, "{name} shows");
+    }
+    window.state_mut().view.overlays = overlays;
+    window.step();
+    let part = window.harness.get_by_label("picture").rect();
+    window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));
+    window.state_mut().view = View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
+    window.settle();
+    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truth.clone()).expect("depth");
+    assert_eq!(truth.depth_m.len(), 640 * 480);
+    assert!(truth.depth_m.iter().any(|depth| *depth > 100.0));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_oracle_draws_strip_by_strip_and_agrees() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = Window::open(Some(small(folder.path())));
+    window.settle();
+    window.click("difference");
+    window.click("B: oracle");
+    window.settle();
+    window.wait("all rows", |state| {
+        state.heard.current_exact().is_some_and(|exact| exact.picture.rows == 24 && exact.picture.difference.is_some())
+    });
+    let (difference, _) = window.state().heard.difference(true).expect("a difference");
+    let predicted_dn = window.state().heard.picture().expect("a picture").plan.predicted.picture_dn();
+    // The oracle's pixels have a standard error of a quarter of max_error_dn, which is 1.
+    assert!(difference.rms_dn < predicted_dn.max(1.0) + 0.5, "{} of {predicted_dn} predicted", difference.rms_dn);
+    assert_eq!(window.state().view.compare, Compare::Difference);
+}
+
+/// The pattern by a camera of 32 x 24 pixels.
+fn small(folder: &std::path::Path) -> std::path::PathBuf {
+    let sets = [("camera.size_px", "[32, 24]"), ("camera.focal_px", "[28.0, 28.0]"), ("camera.principal_point_px", "[15.5, 11.5]")];
+    let sets: Vec<_> = sets.map(|(key, value)| (key.to_owned(), value.to_owned())).into();
+    let scenario = read_scenario(&pattern(), &sets, None).expect("legal");
+    let path = folder.join("small.toml");
+    std::fs::write(&path, toml::to_string(&scenario).expect("text")).expect("written");
+    path
+}

@@ -1,0 +1,64 @@
+//! The timeline.
+
+use eframe::egui::{self, Key, PointerButton};
+use egui_kittest::kittest::Queryable;
+
+use super::harness::{Window, demo, shown};
+use crate::engine::Size;
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_drag_shows_previews_and_a_resting_hand_the_full_frame() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let bar = window.harness.get_by_label("timeline").rect();
+    let at = |share: f32| egui::pos2(bar.left() + 6.0 + share * (bar.width() - 12.0), bar.center().y);
+    window.harness.event(egui::Event::PointerMoved(at(0.25)));
+    let button =
+        |pressed, pos| egui::Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: egui::Modifiers::NONE };
+    window.harness.event(button(true, at(0.25)));
+    window.step();
+    window.harness.event(egui::Event::PointerMoved(at(0.5)));
+    window.step();
+    let there = (0.5_f64 * 119.0).round() as u64;
+    assert!(window.state().timeline.dragged);
+    assert_eq!(window.state().timeline.frame, there);
+    window.wait("the preview", |state| shown(state).is_some_and(|wanted| (wanted.frame, wanted.size) == (there, Size::Preview)));
+    assert_eq!(window.state().heard.picture().expect("a picture").frame.size_px, [320, 240]);
+    window.harness.event(button(false, at(0.5)));
+    window.step();
+    assert!(!window.state().timeline.dragged);
+    window.settle();
+    let picture = window.state().heard.picture().expect("a picture");
+    assert_eq!((picture.frame.size_px, picture.frame.index), ([640, 480], there));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn buttons_and_keys_step_play_and_loop() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    window.click("next frame");
+    window.click("next frame");
+    window.click("previous frame");
+    assert_eq!(window.state().timeline.frame, 1);
+    window.harness.key_press(Key::ArrowRight);
+    window.step();
+    assert_eq!(window.state().timeline.frame, 2);
+    window.harness.key_press_modifiers(egui::Modifiers::SHIFT, Key::ArrowRight);
+    window.step();
+    assert_eq!(window.state().timeline.frame, 12);
+    window.click("loop from");
+    window.click("last frame");
+    assert_eq!(window.state().timeline.frame, 119);
+    window.click("loop to");
+    assert_eq!(window.state().timeline.range, Some([12, 119]));
+    window.click("loop 12-119 off");
+    window.click("first frame");
+    window.click("play");
+    window.wait("time goes on", |state| state.timeline.frame > 3);
+    window.wait("frames of it", |state| state.heard.shown.as_ref().is_some_and(|shown| shown.reply.frame > 0));
+    window.click("stop");
+    assert!(!window.state().timeline.playing);
+    window.settle();
+}

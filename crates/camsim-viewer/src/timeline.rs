@@ -1,0 +1,160 @@
+//! Which frame is shown, and how that changes by itself.
+
+/// Slowest and fastest play, times the flight's own time.
+pub const SPEEDS: [f64; 2] = [0.1, 10.0];
+
+/// Position and play of the timeline. Frames are counted from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timeline {
+    /// Number of frames; 0 before anything is loaded.
+    pub frames: u64,
+    /// Frames a second of the flight's time.
+    pub fps: f64,
+    /// The frame shown.
+    pub frame: u64,
+    /// Whether time goes on.
+    pub playing: bool,
+    /// Times the flight's own time, within [`SPEEDS`].
+    pub speed: f64,
+    /// First and last frame of the loop; play then stays within.
+    pub range: Option<[u64; 2]>,
+    /// Whether a hand drags it at the moment.
+    pub dragged: bool,
+    /// Part of a frame that has gone by in play.
+    pub carry: f64,
+}
+
+impl Default for Timeline {
+    fn default() -> Self {
+        Self { frames: 0, fps: 30.0, frame: 0, playing: false, speed: 1.0, range: None, dragged: false, carry: 0.0 }
+    }
+}
+
+impl Timeline {
+    /// The last frame; 0 without any.
+    pub fn last(&self) -> u64 {
+        self.frames.saturating_sub(1)
+    }
+
+    /// For another sequence: the frame stays as far as there is one.
+    pub fn fit(&mut self, frames: u64, fps: f64) {
+        (self.frames, self.fps) = (frames, fps);
+        self.frame = self.frame.min(self.last());
+        let last = self.last();
+        self.range = self.range.map(|range| range.map(|frame| frame.min(last))).filter(|[first, end]| first < end);
+    }
+
+    /// To a frame; the last one if there are fewer.
+    pub fn seek(&mut self, frame: u64) {
+        self.frame = frame.min(self.last());
+        self.carry = 0.0;
+    }
+
+    /// So many frames on, or back; play stops.
+    pub fn step(&mut self, by: i64) {
+        self.playing = false;
+        self.seek(self.frame.saturating_add_signed(by));
+    }
+
+    /// First and last frame that play visits.
+    pub fn bounds(&self) -> [u64; 2] {
+        self.range.unwrap_or([0, self.last()])
+    }
+
+    /// Time goes on by `seconds` on the wall; frames for which there is no time are left out. Without a loop, play stops at the end.
+    pub fn advance(&mut self, seconds: f64) {
+        if !self.playing || self.dragged {
+            return;
+        }
+        // A window that was hidden for long comes back where it was, not at the end.
+        self.carry += seconds.clamp(0.0, 1.0) * self.speed.clamp(SPEEDS[0], SPEEDS[1]) * self.fps;
+        let whole = self.carry.floor();
+        self.carry -= whole;
+        let [first, last] = self.bounds();
+        let next = self.frame.max(first).saturating_add(whole as u64);
+        if next <= last {
+            self.frame = next;
+        } else if self.range.is_some() {
+            self.frame = first + (next - first) % (last - first + 1);
+        } else {
+            (self.frame, self.playing) = (last, false);
+        }
+    }
+
+    /// Starts or stops; at the end it starts over.
+    pub fn toggle(&mut self) {
+        self.playing = !self.playing && self.frames > 1;
+        if self.playing && self.frame >= self.bounds()[1] {
+            self.seek(self.bounds()[0]);
+        }
+    }
+
+    /// Seconds from frame 0's stamp.
+    pub fn seconds(&self, frame: u64) -> f64 {
+        frame as f64 / self.fps
+    }
+
+    /// The frame whose stamp is nearest to `seconds` after frame 0's.
+    pub fn frame_at(&self, seconds: f64) -> u64 {
+        ((seconds * self.fps).round().max(0.0) as u64).min(self.last())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(frames: u64) -> Timeline {
+        Timeline { frames, ..Timeline::default() }
+    }
+
+    #[test]
+    fn play_keeps_the_clock_whatever_the_steps() {
+        for steps in [1, 7, 60] {
+            let mut timeline = Timeline { playing: true, speed: 0.5, ..of(100) };
+            for _ in 0..steps {
+                timeline.advance(1.0 / f64::from(steps));
+            }
+            assert!(timeline.frame.abs_diff(15) <= 1, "half a second of 30 frames a second at 0.5x in {steps}: {}", timeline.frame);
+        }
+    }
+
+    #[test]
+    fn play_stops_at_the_end_or_loops() {
+        let mut timeline = Timeline { playing: true, frame: 95, ..of(100) };
+        timeline.advance(1.0);
+        assert_eq!((timeline.frame, timeline.playing), (99, false));
+        timeline.toggle();
+        assert_eq!((timeline.frame, timeline.playing), (0, true), "starts over");
+        let mut timeline = Timeline { playing: true, frame: 18, range: Some([10, 19]), ..of(100) };
+        timeline.advance(0.1);
+        assert_eq!((timeline.frame, timeline.playing), (11, true), "18, 19, 10, 11");
+    }
+
+    #[test]
+    fn steps_stay_within_the_sequence_and_stop_play() {
+        let mut timeline = Timeline { playing: true, ..of(3) };
+        timeline.step(-1);
+        assert_eq!((timeline.frame, timeline.playing), (0, false));
+        timeline.step(7);
+        assert_eq!(timeline.frame, 2);
+    }
+
+    #[test]
+    fn an_empty_sequence_does_nothing() {
+        let mut timeline = Timeline::default();
+        timeline.toggle();
+        timeline.step(1);
+        timeline.advance(1.0);
+        assert_eq!((timeline.frame, timeline.playing, timeline.frame_at(9.0)), (0, false, 0));
+    }
+
+    #[test]
+    fn a_shorter_sequence_keeps_the_frame_as_far_as_there_is_one() {
+        let mut timeline = Timeline { frame: 50, range: Some([40, 80]), ..of(100) };
+        timeline.fit(60, 30.0);
+        assert_eq!((timeline.frame, timeline.range), (50, Some([40, 59])));
+        timeline.fit(20, 30.0);
+        assert_eq!((timeline.frame, timeline.range), (19, None));
+    }
+}
