@@ -3,12 +3,14 @@
 //! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so that the renderer can form
 //! camera-relative coordinates without cancellation.
 
+pub mod board;
 pub(crate) mod box_tree;
 pub mod mesh;
 pub mod picture_tiles;
 pub mod terrain;
 pub mod texture;
 
+pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use mesh::{Mesh, MeshVertex, Wrap};
 pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
 pub use terrain::{

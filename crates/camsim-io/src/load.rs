@@ -1,24 +1,28 @@
 //! A scenario's files, read, checked against each other, and brought to one local frame: what rendering starts from.
 
-use std::{cell::RefCell, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
-    geodesy::{Geodetic, GeoidCache},
     mount::{CameraPath, MountError},
-    scenario::{HeightReference, PatternCentre, Scenario},
-    scene::{Encoding, Mesh, Scene, linear_from_srgb},
+    scenario::{HeightReference, Scenario},
     sequence::Sequence,
     tracker::{Tracked, TrackerError, track},
 };
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use crate::{
+    board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
-    pictures::{PictureError, read_gray_image, read_texture},
-    terrain::{TerrainFileError, TerrainSummary, read_terrain},
+    pictures::{PictureError, read_gray_image},
+    terrain::{TerrainFileError, TerrainSummary},
 };
+
+mod scene;
+
+pub use scene::board_place;
+use scene::load_scene;
 
 /// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of it would not end.
 const MOST_FRAMES: f64 = 10e6;
@@ -46,14 +50,19 @@ pub enum LoadError {
         /// What is wrong.
         source: PictureError,
     },
-    /// A local log over a georeferenced terrain.
+    /// A local log over a georeferenced scene.
     #[error(
-        "{log} has local coordinates, but scene.terrain is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
+        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
     )]
     NoOrigin {
         /// The log.
         log: PathBuf,
+        /// What has a place on Earth.
+        key: &'static str,
     },
+    /// A calibration board.
+    #[error("scene.board: {0}")]
+    Board(#[from] BoardFileError),
     /// No frame falls into the window.
     #[error("flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher")]
     NoFrame(f64, f64, f64),
@@ -138,37 +147,6 @@ fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
         (HeightReference::Ellipsoid, HeightReference::Msl) => (HeightConversion::None, true),
         _ => (HeightConversion::None, false),
     }
-}
-
-fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>), LoadError> {
-    let spec = &scenario.scene;
-    let mut scene = Scene {
-        sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
-        fog_visibility_m: spec.fog_visibility_m,
-        ..Scene::default()
-    };
-    let mut summary = None;
-    if let Some(terrain) = &spec.terrain {
-        let frame = log.frame.as_ref().ok_or_else(|| LoadError::NoOrigin { log: scenario.flight.log.clone() })?;
-        let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
-        // One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each thread that reads terrain.
-        thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
-        let undulation = |lat_rad, lon_rad| GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }));
-        let (_, shift_terrain) = height_plan(scenario);
-        let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
-        scene.terrain = Some(loaded.terrain);
-        summary = Some(loaded.summary);
-    }
-    if let Some(pattern) = &spec.pattern {
-        let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
-        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(of_pattern)?;
-        let centre = match pattern.at {
-            PatternCentre::Origin => DVec3::ZERO,
-            PatternCentre::Ned(ned) => DVec3::from_array(ned),
-        };
-        scene.meshes.push(Mesh::level_picture(Arc::new(texture), centre, pattern.width_m));
-    }
-    Ok((scene, summary))
 }
 
 /// Start (path time) and number of frames: frame i counts while its stamp is inside the window.

@@ -2,8 +2,13 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Silhouettes, Solver, TrackerSpec};
-use crate::plan::MAX_KEYS;
+use super::{
+    Auto, Axis, BoardSpec, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, Scenario, Silhouettes, Solver, TrackerSpec,
+};
+use crate::{
+    plan::MAX_KEYS,
+    scene::{Board, BoardError},
+};
 
 /// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
 pub const MAX_ITERATIONS: u32 = 64;
@@ -193,9 +198,13 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
 
 fn check_scene(check: &mut Check, scenario: &Scenario) {
     let scene = &scenario.scene;
-    check.require(scene.terrain.is_some() || scene.pattern.is_some(), "scene", || {
-        "is empty; give scene.terrain = { dem = \"dem.tif\" } or scene.pattern = { image = \"grid.png\", width_m = 100.0 }".into()
+    check.require(scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some(), "scene", || {
+        "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 } or a [scene.board]"
+            .into()
     });
+    if let Some(board) = &scene.board {
+        check_board(check, board);
+    }
     if let Some(pattern) = &scene.pattern {
         check.positive("scene.pattern.width_m", pattern.width_m, "give the width on the ground in metres");
         if let PatternCentre::Ned(centre) = pattern.at {
@@ -207,6 +216,34 @@ fn check_scene(check: &mut Check, scenario: &Scenario) {
     });
     if let Some(visibility_m) = scene.fog_visibility_m {
         check.positive("scene.fog_visibility_m", visibility_m, "leave it out for clear air");
+    }
+}
+
+fn check_board(check: &mut Check, board: &BoardSpec) {
+    if board.target.is_none() {
+        if let Err(BoardError { key, message }) = Board::from_spec(board) {
+            check.fail(format!("scene.board.{key}"), message);
+        }
+    } else {
+        let given = board.kind.is_some() || board.columns.is_some() || board.rows.is_some() || board.size_m.is_some();
+        check.require(!given, "scene.board.target", || "takes the place of kind, columns, rows and size_m: leave those out".into());
+    }
+    check_place(check, "scene.board", board.at, board.geodetic);
+    check.finite("scene.board.angles_deg", &board.angles_deg);
+}
+
+/// Where something stands: in local north-east-down or on Earth, not both.
+fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
+    if let PatternCentre::Ned(centre) = at {
+        check.finite(format!("{table}.at"), &centre);
+    }
+    if let Some([lat_deg, lon_deg, height_m]) = geodetic {
+        let key = format!("{table}.geodetic");
+        let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();
+        check.require(ok, key.clone(), || {
+            format!("must be [latitude_deg -90..90, longitude_deg, height_m], not [{lat_deg}, {lon_deg}, {height_m}]")
+        });
+        check.require(at == PatternCentre::Origin, key, || format!("takes the place of {table}.at: leave one of them out"));
     }
 }
 
@@ -346,6 +383,18 @@ mod tests {
             ("camera.photometric.light", |s| s.camera.photometric.light = -1.0),
             ("camera.photometric.noise_sigma", |s| s.camera.photometric.noise_sigma = f64::NAN),
             ("scene", |s| s.scene.pattern = None),
+            ("scene.board.kind", |s| s.scene.board = Some(BoardSpec::default())),
+            ("scene.board.target", |s| {
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), rows: Some(3), ..BoardSpec::default() });
+            }),
+            ("scene.board.angles_deg", |s| {
+                let angles_deg = [0.0, f64::NAN, 0.0];
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), angles_deg, ..BoardSpec::default() });
+            }),
+            ("scene.board.geodetic", |s| {
+                let geodetic = Some([91.0, 8.0, 400.0]);
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
+            }),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("quality.preset", |s| {
