@@ -124,7 +124,7 @@ fn edges_of_a_chessboard_are_where_the_lens_shows_them() {
     let (sequence, board, spec) = before(|spec| spec);
     let columns = spec.columns.expect("columns") as usize;
     let eye = Eye::new(&sequence, &spec, FRAME);
-    let along = board.points().windows(2).filter(|two| two[1].id as usize % columns != 0).map(|two| (two[0].at_m, two[1].at_m));
+    let along = board.points().windows(2).filter(|two| !(two[1].id as usize).is_multiple_of(columns)).map(|two| (two[0].at_m, two[1].at_m));
     let edges: Vec<_> = along.chain(board.points().iter().zip(&board.points()[columns..]).map(|(a, b)| (a.at_m, b.at_m))).collect();
     let options = RenderOptions { channels: vec![Channel::Color], tolerance_dn: 0.5, ..RenderOptions::default() };
     let oracle = Oracle::new(sequence.clone()).expect("an oracle").render(FRAME, &options);

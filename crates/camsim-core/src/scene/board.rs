@@ -11,6 +11,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot};
 use super::{Mesh, MeshVertex, Texture, Wrap};
 use crate::scenario::{BoardKind, BoardSpec, Dictionary};
 
+#[rustfmt::skip]
 mod codes;
 mod layout;
 mod raster;
@@ -138,15 +139,10 @@ impl Board {
         let scale = self.scale();
         let corner = |u: f64, v: f64| {
             let at_m = self.layout.low_m + (DVec2::new(u, v) * scale.texels - scale.margin_texels) * scale.texel_m;
-            MeshVertex { position_m: (ned_from_board * at_m.extend(0.0)).as_vec3().to_array(), uv: [u as f32, v as f32] }
+            MeshVertex::new((ned_from_board * at_m.extend(0.0)).as_vec3().to_array(), [u as f32, v as f32])
         };
-        Mesh {
-            vertices: vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)],
-            indices: vec![0, 3, 1, 0, 2, 3],
-            texture: Arc::new(self.picture()),
-            origin_ned_m: centre_ned_m,
-            wrap: Wrap::Clamp,
-        }
+        let vertices = vec![corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
+        Mesh::new(vertices, vec![0, 3, 1, 0, 2, 3], Arc::new(self.picture()), centre_ned_m, Wrap::Clamp)
     }
 
     /// Texels of the picture.

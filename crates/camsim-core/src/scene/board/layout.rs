@@ -95,12 +95,11 @@ pub(super) fn april_grid(columns: u32, rows: u32, tag_m: f64, spacing: f64, firs
 /// OpenCV's ChArUco board of `columns` x `rows` squares: the one at the top left is black, the white ones have markers, row by row.
 pub(super) fn charuco(columns: u32, rows: u32, square_m: f64, marker_m: f64, dictionary: Dictionary, first_id: u32) -> Layout {
     let mut layout = chessboard(columns - 1, rows - 1, DVec2::splat(square_m));
-    let mut id = first_id;
-    for (i, j) in (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1) {
+    let white = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1);
+    for (id, (i, j)) in (first_id..).zip(white) {
         let low_m = layout.low_m + square_m * DVec2::new(count(i), count(j)) + 0.5 * (square_m - marker_m);
         let (side, code) = dictionary.code(id);
         tag(&mut layout.shapes, low_m, marker_m, side, code, ARUCO_BORDER);
-        id += 1;
     }
     layout
 }

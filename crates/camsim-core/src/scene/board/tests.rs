@@ -134,7 +134,7 @@ fn a_board_stands_where_its_angles_say() {
     }
     let board = Board::from_spec(&spec(BoardKind::Chessboard, 3, 2, 0.1)).unwrap();
     let mesh = board.mesh(DVec3::new(5.0, 6.0, -7.0), ned_from_board([0.0, 90.0, 0.0]));
-    let top_left = mesh.vertices.iter().position(|vertex| vertex.uv == [0.0, 0.0]).unwrap();
+    let top_left = mesh.shape.vertices.iter().position(|vertex| vertex.uv == [0.0, 0.0]).unwrap();
     // Four by three squares and one around them.
     assert!(
         (mesh.position_ned_m(top_left as u32) - DVec3::new(5.0, 5.7, -7.25)).length() < 1e-6,
