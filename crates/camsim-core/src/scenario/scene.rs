@@ -17,6 +17,9 @@ pub struct SceneSpec {
     /// A calibration board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
+    /// Models.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gltf: Vec<GltfSpec>,
     /// Sky colour, sRGB.
     #[serde(default = "sky")]
     pub sky: [f64; 3],
@@ -104,6 +107,45 @@ pub struct BoardSpec {
     /// Roll, pitch, yaw: 0 0 0 lies face up, its top in the north; pitch 90 stands, and is looked at northwards.
     #[serde(default)]
     pub angles_deg: [f64; 3],
+}
+
+/// `[[scene.gltf]]`: a model, once or wherever a table says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GltfSpec {
+    /// The model: `.gltf` or `.glb`.
+    pub file: PathBuf,
+    /// Where its origin is: `"origin"` or `[north_m, east_m, down_m]`.
+    #[serde(default)]
+    pub at: PatternCentre,
+    /// The same on Earth, in place of `at`: latitude and longitude in degrees, height in metres as `flight.height` says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geodetic: Option<[f64; 3]>,
+    /// A table of places in place of `at`: `n_m,e_m,d_m` or `lat_deg,lon_deg,height_m`, and if wanted `heading_deg` and `scale`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub placements: Option<PathBuf>,
+    /// Where its front (+z) looks, degrees east of north. With 180 its x is east, as maps have it.
+    #[serde(default)]
+    pub heading_deg: f64,
+    /// Metres for each of its metres.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Whether its origin is put on the terrain, whatever height its place has.
+    #[serde(default)]
+    pub on_ground: bool,
+    /// Which of the file's scenes; the file's own choice if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<u32>,
+    /// Time within its animations, seconds; as its nodes stand if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_s: Option<f64>,
+    /// Which animation; all of them together if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub animation: Option<u32>,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// Calibration boards.

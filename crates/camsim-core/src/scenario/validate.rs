@@ -198,10 +198,23 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
 
 fn check_scene(check: &mut Check, scenario: &Scenario) {
     let scene = &scenario.scene;
-    check.require(scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some(), "scene", || {
-        "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 } or a [scene.board]"
+    let has_surface = scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
+    check.require(has_surface, "scene", || {
+        "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 }, a [scene.board] or a [[scene.gltf]]"
             .into()
     });
+    for (i, model) in scene.gltf.iter().enumerate() {
+        let table = format!("scene.gltf.{i}");
+        check_place(check, &table, model.at, model.geodetic);
+        check.finite(format!("{table}.heading_deg"), &[model.heading_deg]);
+        check.positive(format!("{table}.scale"), model.scale, "1 is as the file has it");
+        check.finite(format!("{table}.time_s"), &[model.time_s.unwrap_or(0.0)]);
+        check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
+            "needs a terrain to stand on: give scene.terrain, or heights in the places".into()
+        });
+        let twice = model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
+        check.require(!twice, format!("{table}.placements"), || "takes the place of at and geodetic: leave those out".into());
+    }
     if let Some(board) = &scene.board {
         check_board(check, board);
     }
@@ -310,7 +323,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{FlightSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{FlightSpec, GltfSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
 
     fn good() -> Scenario {
         Scenario {
@@ -333,6 +346,21 @@ mod tests {
             },
             quality: Default::default(),
             output: Default::default(),
+        }
+    }
+
+    fn model() -> GltfSpec {
+        GltfSpec {
+            file: "a.glb".into(),
+            at: Default::default(),
+            geodetic: None,
+            placements: None,
+            heading_deg: 0.0,
+            scale: 1.0,
+            on_ground: false,
+            scene: None,
+            time_s: None,
+            animation: None,
         }
     }
 
@@ -383,6 +411,11 @@ mod tests {
             ("camera.photometric.light", |s| s.camera.photometric.light = -1.0),
             ("camera.photometric.noise_sigma", |s| s.camera.photometric.noise_sigma = f64::NAN),
             ("scene", |s| s.scene.pattern = None),
+            ("scene.gltf.0.scale", |s| s.scene.gltf = vec![GltfSpec { scale: 0.0, ..model() }]),
+            ("scene.gltf.0.on_ground", |s| s.scene.gltf = vec![GltfSpec { on_ground: true, ..model() }]),
+            ("scene.gltf.1.placements", |s| {
+                s.scene.gltf = vec![model(), GltfSpec { geodetic: Some([1.0; 3]), placements: Some("a.csv".into()), ..model() }];
+            }),
             ("scene.board.kind", |s| s.scene.board = Some(BoardSpec::default())),
             ("scene.board.target", |s| {
                 s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), rows: Some(3), ..BoardSpec::default() });
