@@ -18,6 +18,8 @@ pub mod pictures;
 
 pub mod board_file;
 
+pub mod gltf_file;
+
 pub mod load;
 
 pub mod builtin;

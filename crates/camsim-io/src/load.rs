@@ -15,10 +15,12 @@ use glam::DVec2;
 use crate::{
     board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
+    gltf_file::GltfError,
     pictures::{PictureError, read_gray_image},
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod placements;
 mod scene;
 
 pub use scene::board_place;
@@ -59,6 +61,29 @@ pub enum LoadError {
         log: PathBuf,
         /// What has a place on Earth.
         key: &'static str,
+    },
+    /// A model.
+    #[error("scene.gltf: {0}")]
+    Gltf(#[from] GltfError),
+    /// A table of places.
+    #[error("{path}: {problem}")]
+    Placements {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A place without ground.
+    #[error(
+        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east {east_m:.1} m: move it onto the terrain, or leave on_ground out"
+    )]
+    NoGround {
+        /// The model.
+        file: PathBuf,
+        /// The place.
+        north_m: f64,
+        /// The place.
+        east_m: f64,
     },
     /// A calibration board.
     #[error("scene.board: {0}")]
@@ -108,7 +133,7 @@ pub struct Loaded {
 pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
     let (log, tracked) = load_flight(scenario)?;
     let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount)?;
-    let (scene, terrain) = load_scene(scenario, &log)?;
+    let (scene, terrain, notes) = load_scene(scenario, &log)?;
     let of_vignette = |source| LoadError::Picture { key: "camera.photometric.vignette", source };
     let vignette = scenario.camera.photometric.vignette.as_deref().map(read_gray_image).transpose().map_err(of_vignette)?.map(Arc::new);
     let zoom_track = load_zoom_track(scenario, &log)?;
@@ -123,7 +148,8 @@ pub fn load_sequence(scenario: &Scenario) -> Result<Loaded, LoadError> {
         vignette,
         zoom_track,
     };
-    let warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
+    let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
+    warnings.extend(notes);
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings })
 }
 

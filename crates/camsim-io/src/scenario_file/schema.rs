@@ -37,6 +37,8 @@ pub(crate) enum Kind {
     CountOr(u32, &'static [&'static str]),
     /// That many numbers.
     Numbers(usize),
+    /// `true` or `false`.
+    Flag,
     /// That many numbers, or this word.
     NumbersOr(usize, &'static str),
     /// That many whole numbers of at most 32 bits; with the most that makes sense, as above.
@@ -132,7 +134,17 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("scene.board.at", NumbersOr(3, "origin")),
     ("scene.board.geodetic", Numbers(3)),
     ("scene.board.angles_deg", Numbers(3)),
-    ("scene.gltf", Later),
+    ("scene.gltf", Tables),
+    ("scene.gltf.file", Path),
+    ("scene.gltf.at", NumbersOr(3, "origin")),
+    ("scene.gltf.geodetic", Numbers(3)),
+    ("scene.gltf.placements", Path),
+    ("scene.gltf.heading_deg", Number),
+    ("scene.gltf.scale", Number),
+    ("scene.gltf.on_ground", Flag),
+    ("scene.gltf.scene", Within(0, u32::MAX)),
+    ("scene.gltf.time_s", Number),
+    ("scene.gltf.animation", Within(0, u32::MAX)),
     ("scene.sky", Numbers(3)),
     ("scene.fog_visibility_m", Number),
     ("quality.preset", Word(&["default", "paper"])),
@@ -163,6 +175,7 @@ pub(super) const REQUIRED: &[(&str, &str)] = &[
     ("scene.terrain.dem", "scene.terrain"),
     ("scene.pattern.image", "scene.pattern"),
     ("scene.pattern.width_m", "scene.pattern"),
+    ("scene.gltf.file", "scene.gltf"),
     ("camera.mount.vibration.axis", "camera.mount.vibration"),
     ("camera.mount.vibration.hz", "camera.mount.vibration"),
     ("camera.zoom.at", "camera.zoom"),

@@ -30,7 +30,7 @@ fn the_printed_default_holds_the_defaults() {
 #[test]
 fn every_word_of_the_schema_is_known_to_the_structs() {
     for (key, kind) in KEYS {
-        if ["camera.mount.vibration.", "camera.zoom.", "scene.board."].iter().any(|table| key.starts_with(table)) {
+        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."].iter().any(|table| key.starts_with(table)) {
             continue;
         }
         let values: Vec<String> = match kind {
@@ -55,7 +55,7 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
 #[test]
 fn every_key_of_the_structs_is_in_the_schema() {
     let mut text = print_default();
-    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "fog_visibility_m"] {
+    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "gltf", "fog_visibility_m"] {
         text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
     }
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
@@ -78,6 +78,9 @@ fn every_key_of_the_structs_is_in_the_schema() {
         geodetic: Some([47.0, 8.0, 400.0]),
         ..board(1, 1, 1.0)
     });
+    let model = &mut scenario.scene.gltf[0];
+    (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
+    (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
     let saved = toml::to_string(&scenario).unwrap();
     let mut seen = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
