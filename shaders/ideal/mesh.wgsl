@@ -1,14 +1,20 @@
-// Triangle meshes: positions relative to the mesh's own origin.
-#import ideal/surface.wgsl
-
-struct MeshPlacement {
-    // Mesh origin minus the whole-metre base.
-    origin_from_base_m: vec4<f32>,
-}
-
-@group(1) @binding(2) var<uniform> placement: MeshPlacement;
+// Triangle meshes without holes.
+#import ideal/mesh_surface.wgsl
 
 @vertex
-fn vertex(@location(0) position_m: vec3<f32>, @location(1) uv: vec2<f32>) -> Surface {
-    return project_surface(placement.origin_from_base_m.xyz + position_m, uv);
+fn vertex(@builtin(instance_index) instance: u32, @location(0) position_m: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) tint: vec4<f32>) -> MeshSurface {
+    let surface = project_surface(base_from_shape(instance, position_m), uv);
+    return MeshSurface(surface.clip, surface.uv, surface.in_camera_m, tint);
+}
+
+struct MeshSurface {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) uv: vec2<f32>,
+    @location(1) in_camera_m: vec3<f32>,
+    @location(2) tint: vec4<f32>,
+}
+
+@fragment
+fn fragment(in: MeshSurface) -> @location(0) vec4<f32> {
+    return mesh_color(in.uv, in.tint, in.in_camera_m);
 }

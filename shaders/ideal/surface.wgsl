@@ -76,12 +76,11 @@ fn version_for(cell: f32) -> Version {
 
 #import <slot:reads>
 
-@fragment
-fn fragment(in: Surface) -> @location(0) vec4<f32> {
-    var color = picture_at(in.uv);
+// Linear light that arrives from a place of that colour.
+fn in_fog(color: vec3<f32>, in_camera_m: vec3<f32>) -> vec4<f32> {
     if (ideal_camera.sky.w > 0.0) {
-        let fog = 1.0 - exp(-ideal_camera.sky.w * length(in.in_camera_m));
-        color = mix(color, ideal_camera.sky.rgb, fog);
+        let fog = 1.0 - exp(-ideal_camera.sky.w * length(in_camera_m));
+        return vec4<f32>(mix(color, ideal_camera.sky.rgb, fog), 1.0);
     }
     return vec4<f32>(color, 1.0);
 }

@@ -7,3 +7,8 @@ fn vertex(@builtin(vertex_index) index: u32) -> Surface {
     let at = terrain_vertex(index);
     return project_surface(at.from_base_m, at.uv);
 }
+
+@fragment
+fn fragment(in: Surface) -> @location(0) vec4<f32> {
+    return in_fog(picture_at(in.uv), in.in_camera_m);
+}

@@ -2,6 +2,7 @@
 
 pub mod apply;
 pub mod bench;
+pub mod board;
 pub mod camera;
 pub mod compare;
 pub mod completions;

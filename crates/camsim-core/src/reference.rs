@@ -87,6 +87,8 @@ pub struct Hit {
     pub depth_m: f64,
     /// Texture coordinates.
     pub texture_uv: [f64; 2],
+    /// Factor of the texture's colour there.
+    pub tint: [f64; 3],
     /// 0 = terrain, 1 + i = mesh i of the scene.
     pub surface: u32,
 }

@@ -3,19 +3,23 @@
 //! Everything stands in local NED metres. Vertices are f32 offsets from an f64 (or whole-metre) origin, so that the renderer can form
 //! camera-relative coordinates without cancellation.
 
+use crate::pose::CameraPose;
+
+pub mod board;
 pub(crate) mod box_tree;
 pub mod mesh;
 pub mod picture_tiles;
 pub mod terrain;
 pub mod texture;
 
-pub use mesh::{Mesh, MeshVertex, Wrap};
+pub use board::{Board, BoardError, BoardPoint, ned_from_board};
+pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
 pub use terrain::{
     Aabb, CHUNK_CELLS, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid, TerrainHit,
     TerrainMesh, TerrainVertex, VERTEX_BITS,
 };
-pub use texture::{Encoding, MipLevel, Texture, linear_from_srgb, srgb_from_linear};
+pub use texture::{Encoding, MipLevel, Texture, Wrap, linear_from_srgb, srgb_from_linear};
 
 /// What there is to see.
 #[derive(Clone, Debug, Default)]
@@ -28,4 +32,19 @@ pub struct Scene {
     pub sky_linear: [f32; 3],
     /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
     pub fog_visibility_m: Option<f64>,
+}
+
+impl Scene {
+    /// Boxes around all meshes, NED.
+    #[must_use]
+    pub fn mesh_bounds(&self) -> Vec<Aabb> {
+        self.meshes.iter().map(Mesh::bounds).collect()
+    }
+}
+
+/// Places of the boxes that may be in view, in order. `tangents`: u_min, u_max, v_min, v_max.
+#[must_use]
+pub fn in_view(bounds: &[Aabb], pose: &CameraPose, tangents: [f64; 4]) -> Vec<u32> {
+    let frustum = terrain::Frustum::new(pose, tangents);
+    (0..).zip(bounds).filter(|(_, bounds)| frustum.may_see(bounds)).map(|(i, _)| i).collect()
 }

@@ -1,6 +1,6 @@
 //! The ideal frame: linear colour and reversed depth of a perfect camera at the key instant (paper section 4).
 
-use std::collections::HashMap;
+use std::{collections::HashMap, ops::Range};
 
 use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
@@ -14,17 +14,19 @@ use glam::{DMat3, DVec3};
 use crate::{
     context::GpuContext,
     engine::RenderErrorBase,
-    layout::IdealCamera,
+    layout::{IdealCamera, MeshPlacement, MeshVertexData},
     recorder::Recorder,
-    shaders::{self, ComposeError, Slot},
-    upload::SceneBuffers,
+    shaders::{ComposeError, Slot},
+    upload::{MeshBatch, MeshKind, SceneBuffers},
 };
 
+mod drawing;
 mod fine;
 mod marks;
 mod near_marks;
 mod surfaces;
 
+use drawing::{Drawing, pipeline};
 pub(crate) use fine::whole;
 pub use fine::{FINE_SAMPLES, FineTarget};
 use fine::{TILE_PX, scale_of, texture};
@@ -42,8 +44,8 @@ pub const STORED_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSr
 pub const STORED_VIEW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth format of the ideal frame: near / z.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Distance between the placements of two meshes in their buffer.
-const PLACEMENT_STRIDE: u64 = 256;
+/// Uniform buffers have at least this many bytes.
+const MIN_BYTES: u64 = 256;
 
 /// Textures that an ideal frame is drawn to.
 #[derive(Debug)]
@@ -133,6 +135,7 @@ pub struct IdealPass {
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
+    placement_layout: wgpu::BindGroupLayout,
     /// Compiled when first needed.
     pipelines: HashMap<SurfaceKey, SurfacePipelines>,
     color_format: wgpu::TextureFormat,
@@ -162,7 +165,8 @@ enum SurfaceKey {
 #[derive(Debug)]
 struct SurfacePipelines {
     terrain: wgpu::RenderPipeline,
-    mesh: wgpu::RenderPipeline,
+    /// Those that the scene needs.
+    meshes: HashMap<MeshKind, wgpu::RenderPipeline>,
 }
 
 /// Buffers of one ideal frame of a frame in flight, and their bind groups.
@@ -173,7 +177,10 @@ pub struct IdealSlot {
     terrain: Option<TerrainSlot>,
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
+    placement_group: wgpu::BindGroup,
+    /// By batch: what is on it, and which placements are drawn.
     mesh_groups: Vec<wgpu::BindGroup>,
+    drawn: Vec<Range<u32>>,
 }
 
 impl IdealSlot {
@@ -204,37 +211,47 @@ impl IdealPass {
             true => layout("camsim.ideal.terrain", &[tiles, sampler, pulled, buffer_entry(3, wgpu::ShaderStages::FRAGMENT, storage)]),
             false => layout("camsim.ideal.terrain", &[texture, sampler, pulled]),
         };
-        let mesh_layout =
-            layout("camsim.ideal.mesh", &[texture, sampler, buffer_entry(2, wgpu::ShaderStages::VERTEX, wgpu::BufferBindingType::Uniform)]);
+        let material = buffer_entry(2, wgpu::ShaderStages::FRAGMENT, wgpu::BufferBindingType::Uniform);
+        let mesh_layout = layout("camsim.ideal.mesh", &[texture, sampler, material]);
+        let placement_layout = layout("camsim.ideal.placements", &[buffer_entry(0, wgpu::ShaderStages::VERTEX, storage)]);
         Ok(Self {
             silhouettes: None,
             camera_layout,
             terrain_layout,
             mesh_layout,
+            placement_layout,
             pipelines: HashMap::new(),
             color_format: color_format(preset),
             has_tiles,
         })
     }
 
-    fn surface_pipelines(&self, gpu: &GpuContext, key: SurfaceKey) -> Result<SurfacePipelines, ComposeError> {
+    fn surface_pipelines(&self, gpu: &GpuContext, key: SurfaceKey, batches: &[MeshBatch]) -> Result<SurfacePipelines, ComposeError> {
         let mesh_vertices = wgpu::VertexBufferLayout {
-            array_stride: 20,
+            array_stride: size_of::<MeshVertexData>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2],
+            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm16x4],
         };
         let (reads, samples, format) = match key {
             SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
-            // Nothing is read for depth.
+            // Nothing is read for depth, but for holes.
             SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
         let slots = |has_tiles| [reads_slot(reads), picture_slot(has_tiles)];
-        let (terrain, mesh) = ([&self.camera_layout, &self.terrain_layout], [&self.camera_layout, &self.mesh_layout]);
-        Ok(SurfacePipelines {
-            terrain: pipeline(gpu, "ideal/terrain.wgsl", &slots(self.has_tiles), &terrain, &[], samples, format)?,
-            mesh: pipeline(gpu, "ideal/mesh.wgsl", &slots(false), &mesh, &[Some(mesh_vertices)], samples, format)?,
-        })
+        let ground = [&self.camera_layout, &self.terrain_layout];
+        let on_ground = Drawing { samples, color: format, ..Drawing::default() };
+        let terrain = pipeline(gpu, "ideal/terrain.wgsl", &slots(self.has_tiles), &ground, &[], on_ground)?;
+        let layouts = [&self.camera_layout, &self.mesh_layout, &self.placement_layout];
+        let mut meshes = HashMap::new();
+        for MeshBatch { kind, .. } in batches {
+            if !meshes.contains_key(kind) {
+                let file = if kind.holes { "ideal/mesh_holes.wgsl" } else { "ideal/mesh.wgsl" };
+                let drawing = Drawing { one_sided: kind.one_sided, holes: kind.holes, ..on_ground };
+                meshes.insert(*kind, pipeline(gpu, file, &slots(false), &layouts, &[Some(mesh_vertices.clone())], drawing)?);
+            }
+        }
+        Ok(SurfacePipelines { terrain, meshes })
     }
 
     /// Buffers for one ideal frame of this scene.
@@ -243,32 +260,33 @@ impl IdealPass {
         let create = |label, size: u64, usage| {
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
-                size: size.max(PLACEMENT_STRIDE),
+                size: size.max(MIN_BYTES),
                 usage: usage | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             })
         };
         let camera = create("camsim.ideal.camera", size_of::<IdealCamera>() as u64, wgpu::BufferUsages::UNIFORM);
-        let placements = create("camsim.ideal.placements", buffers.meshes.len() as u64 * PLACEMENT_STRIDE, wgpu::BufferUsages::UNIFORM);
+        let placement_bytes = (buffers.placed.len() * size_of::<MeshPlacement>()) as u64;
+        let placements = create("camsim.ideal.placements", placement_bytes, wgpu::BufferUsages::STORAGE);
         let group = |layout, entries: &[wgpu::BindGroupEntry]| {
             gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some("camsim.ideal"), layout, entries })
         };
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
         let terrain = buffers.terrain.as_ref().map(|_| TerrainSlot::new(gpu));
-        let mesh_groups = buffers.meshes.iter().zip(0_u64..).map(|(mesh, i)| {
-            let placement = wgpu::BufferBinding { buffer: &placements, offset: i * PLACEMENT_STRIDE, size: wgpu::BufferSize::new(16) };
+        let mesh_groups = buffers.batches.iter().map(|batch| {
             group(
                 &self.mesh_layout,
                 &[
-                    entry(0, wgpu::BindingResource::TextureView(&mesh.texture)),
-                    entry(1, wgpu::BindingResource::Sampler(&mesh.sampler)),
-                    entry(2, wgpu::BindingResource::Buffer(placement)),
+                    entry(0, wgpu::BindingResource::TextureView(&batch.texture)),
+                    entry(1, wgpu::BindingResource::Sampler(&batch.sampler)),
+                    entry(2, batch.material.as_entire_binding()),
                 ],
             )
         });
         let mesh_groups = mesh_groups.collect();
-        IdealSlot { camera, terrain, placements, camera_group, mesh_groups }
+        let placement_group = group(&self.placement_layout, &[entry(0, placements.as_entire_binding())]);
+        IdealSlot { camera, terrain, placements, camera_group, placement_group, mesh_groups, drawn: Vec::new() }
     }
 
     /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
@@ -292,7 +310,7 @@ impl IdealPass {
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
         for key in [Some(plain), fine].into_iter().flatten() {
             if !self.pipelines.contains_key(&key) {
-                self.pipelines.insert(key, self.surface_pipelines(gpu, key)?);
+                self.pipelines.insert(key, self.surface_pipelines(gpu, key, &buffers.batches)?);
             }
         }
         if fine.is_some() && self.silhouettes.is_none() {
@@ -312,7 +330,7 @@ impl IdealPass {
                 lod = mesh.lod;
             }
             index_counts.push(indices);
-            place_meshes(recorder, slot, buffers, base_ned_m);
+            place_meshes(recorder, slot, buffers, &key.pose, plan.ideal.tangents(), base_ned_m);
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
@@ -435,51 +453,4 @@ fn texture_entries(view_dimension: wgpu::TextureViewDimension) -> [wgpu::BindGro
         wgpu::BindGroupLayoutEntry { binding: 0, visibility, ty: texture, count: None },
         wgpu::BindGroupLayoutEntry { binding: 1, visibility, ty: sampler, count: None },
     ]
-}
-
-fn pipeline(
-    gpu: &GpuContext,
-    file: &str,
-    slots: &[Slot],
-    layouts: &[&wgpu::BindGroupLayout],
-    buffers: &[Option<wgpu::VertexBufferLayout<'_>>],
-    samples: u32,
-    color: Option<wgpu::TextureFormat>,
-) -> Result<wgpu::RenderPipeline, ComposeError> {
-    let module = shaders::module(&gpu.device, file, file, slots)?;
-    let groups: Vec<_> = layouts.iter().map(|layout| Some(*layout)).collect();
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(file),
-        bind_group_layouts: &groups,
-        immediate_size: 0,
-    });
-    let compilation_options = wgpu::PipelineCompilationOptions::default();
-    let targets = [color.map(wgpu::ColorTargetState::from)];
-    Ok(gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(file),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("vertex"),
-            compilation_options: compilation_options.clone(),
-            buffers,
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH_FORMAT,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
-        multisample: wgpu::MultisampleState { count: samples, ..Default::default() },
-        fragment: color.map(|_| wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("fragment"),
-            compilation_options,
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    }))
 }

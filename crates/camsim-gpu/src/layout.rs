@@ -1,6 +1,7 @@
 //! `repr(C)` mirrors of the shader structs; a test compares their offsets with naga's reflection.
 
 use bytemuck::{Pod, Zeroable};
+use camsim_core::scene::MeshVertex;
 
 /// Mirror of `Frame` in shaders/common/frame.wgsl.
 #[repr(C)]
@@ -90,6 +91,37 @@ pub struct Truth {
     pub source_px: [f32; 2],
     pub point_ned_m: [f32; 3],
     pub depth_m: f32,
+}
+
+/// A corner of a mesh: `shaders/ideal/mesh.wgsl`. Tints have 16 bits.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshVertexData {
+    /// Metres in the shape's axes.
+    pub position_m: [f32; 3],
+    /// Texture coordinates.
+    pub uv: [f32; 2],
+    /// Factor of the texture's colour and alpha, times 65535.
+    pub tint: [u16; 4],
+}
+
+impl From<&MeshVertex> for MeshVertexData {
+    fn from(vertex: &MeshVertex) -> Self {
+        let tint = vertex.tint.map(|part| (part.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16);
+        Self { position_m: vertex.position_m, uv: vertex.uv, tint }
+    }
+}
+
+/// Where a mesh stands from a key: rows of a turn, each followed by the origin's place. Mirror of `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshPlacement {
+    /// North.
+    pub x: [f32; 4],
+    /// East.
+    pub y: [f32; 4],
+    /// Down.
+    pub z: [f32; 4],
 }
 
 #[cfg(test)]
@@ -194,6 +226,9 @@ mod tests {
                 pad2,
             ]
         );
+        let slots = [crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(false)];
+        let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
+        assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
         assert_mirror!(&module, "KeyLayout", KeyLayout, [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]);
     }

@@ -24,6 +24,8 @@ embedded![
     "ideal/marked_tiles.wgsl",
     "ideal/marks.wgsl",
     "ideal/mesh.wgsl",
+    "ideal/mesh_holes.wgsl",
+    "ideal/mesh_surface.wgsl",
     "ideal/near_marks.wgsl",
     "ideal/picture/tiles.wgsl",
     "ideal/picture/whole.wgsl",

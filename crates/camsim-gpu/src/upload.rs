@@ -1,11 +1,14 @@
 //! The scene on the device: textures with their mips, terrain and mesh buffers. Uploaded once a sequence.
 
-use camsim_core::scene::{Encoding, Mesh, Scene, Terrain, Texture, Wrap, is_whole};
-use glam::DVec3;
+use std::{collections::HashMap, ops::Range, sync::Arc};
+
+use camsim_core::scene::{Aabb, Encoding, Mesh, Scene, Shape, Terrain, Texture, Wrap, is_whole};
+use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
 
 use crate::{
     context::{GpuContext, GpuError},
+    layout::MeshVertexData,
     tiles::TilePool,
 };
 
@@ -14,8 +17,12 @@ use crate::{
 pub struct SceneBuffers {
     /// Terrain, if there is any.
     pub terrain: Option<TerrainBuffers>,
-    /// Meshes in scene order.
-    pub meshes: Vec<MeshBuffers>,
+    /// Meshes by shape and material.
+    pub batches: Vec<MeshBatch>,
+    /// Where all meshes stand, those of a batch one after the other.
+    pub placed: Vec<PlacedShape>,
+    /// Boxes around them, NED.
+    pub bounds: Vec<Aabb>,
     /// Trilinear, edges held; the shader takes several taps where the footprint is long.
     pub sampler: wgpu::Sampler,
 }
@@ -36,10 +43,10 @@ pub enum GroundPicture {
     Tiles(Box<TilePool>),
 }
 
-/// One mesh.
+/// Meshes that are drawn at once: the same shape and the same material.
 #[derive(Debug)]
-pub struct MeshBuffers {
-    /// Positions and texture coordinates.
+pub struct MeshBatch {
+    /// Positions, texture coordinates and tints.
     pub vertices: wgpu::Buffer,
     /// Triangle list.
     pub indices: wgpu::Buffer,
@@ -49,8 +56,30 @@ pub struct MeshBuffers {
     pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
     pub sampler: wgpu::Sampler,
-    /// NED position of the mesh's own origin, metres.
+    /// Light of its own, and the alpha below which there is a hole.
+    pub material: wgpu::Buffer,
+    /// Which pipeline draws it.
+    pub kind: MeshKind,
+    /// Places of its meshes in [`SceneBuffers::placed`].
+    pub members: Range<u32>,
+}
+
+/// What pipelines of meshes differ in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct MeshKind {
+    /// Triangles that turn away are left out.
+    pub one_sided: bool,
+    /// Samples ask for alpha.
+    pub holes: bool,
+}
+
+/// Where a mesh stands.
+#[derive(Clone, Debug)]
+pub struct PlacedShape {
+    /// NED position of the shape's origin, metres.
     pub origin_ned_m: DVec3,
+    /// From the shape's axes to NED.
+    pub ned_from_shape: DMat3,
 }
 
 impl SceneBuffers {
@@ -59,10 +88,13 @@ impl SceneBuffers {
     /// # Errors
     /// [`GpuError::TooLarge`] for what the adapter cannot hold.
     pub fn new(gpu: &GpuContext, scene: &Scene) -> Result<Self, GpuError> {
-        let sampler = create_sampler(gpu, Wrap::Clamp);
+        let sampler = create_sampler(gpu, [Wrap::Clamp; 2], false);
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
-        let meshes = scene.meshes.iter().map(|mesh| upload_mesh(gpu, mesh)).collect::<Result<_, _>>()?;
-        Ok(Self { terrain, meshes, sampler })
+        let (batches, order) = upload_meshes(gpu, scene)?;
+        let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
+        let placed = meshes().map(|mesh| PlacedShape { origin_ned_m: mesh.origin_ned_m, ned_from_shape: mesh.ned_from_shape }).collect();
+        let bounds = meshes().map(Mesh::bounds).collect();
+        Ok(Self { terrain, batches, placed, bounds, sampler })
     }
 }
 
@@ -84,16 +116,17 @@ impl SceneBuffers {
     }
 }
 
-fn create_sampler(gpu: &GpuContext, wrap: Wrap) -> wgpu::Sampler {
-    let address = match wrap {
+fn create_sampler(gpu: &GpuContext, wrap: [Wrap; 2], nearest: bool) -> wgpu::Sampler {
+    let [address_mode_u, address_mode_v] = wrap.map(|wrap| match wrap {
         Wrap::Clamp => wgpu::AddressMode::ClampToEdge,
         Wrap::Repeat => wgpu::AddressMode::Repeat,
-    };
+        Wrap::Mirror => wgpu::AddressMode::MirrorRepeat,
+    });
     gpu.device.create_sampler(&wgpu::SamplerDescriptor {
         label: Some("camsim.ideal.sampler"),
-        address_mode_u: address,
-        address_mode_v: address,
-        mag_filter: wgpu::FilterMode::Linear,
+        address_mode_u,
+        address_mode_v,
+        mag_filter: if nearest { wgpu::FilterMode::Nearest } else { wgpu::FilterMode::Linear },
         min_filter: wgpu::FilterMode::Linear,
         mipmap_filter: wgpu::MipmapFilterMode::Linear,
         ..Default::default()
@@ -108,20 +141,54 @@ fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers,
     Ok(TerrainBuffers { picture })
 }
 
-fn upload_mesh(gpu: &GpuContext, mesh: &Mesh) -> Result<MeshBuffers, GpuError> {
-    let texture = upload_texture(gpu, &mesh.texture, "the picture of a mesh or pattern")?;
-    let floats: Vec<f32> = mesh.vertices.iter().flat_map(|v| v.position_m.into_iter().chain(v.uv)).collect();
+/// Batches, and the meshes' order in them. Shapes and pictures that several share are uploaded once.
+fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec<usize>), GpuError> {
+    let mut groups: Vec<(&Mesh, Vec<usize>)> = Vec::new();
+    let mut known: HashMap<*const Shape, Vec<usize>> = HashMap::new();
+    for (i, mesh) in scene.meshes.iter().enumerate() {
+        let of_shape = known.entry(Arc::as_ptr(&mesh.shape)).or_default();
+        match of_shape.iter().find(|&&group| groups[group].0.material.is(&mesh.material)) {
+            Some(&group) => groups[group].1.push(i),
+            None => {
+                of_shape.push(groups.len());
+                groups.push((mesh, vec![i]));
+            }
+        }
+    }
+    let mut textures: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
+    let (mut batches, mut order) = (Vec::new(), Vec::new());
+    for (mesh, members) in groups {
+        let key = Arc::as_ptr(&mesh.material.texture);
+        let texture = match textures.get(&key) {
+            Some(view) => view.clone(),
+            None => upload_texture(gpu, &mesh.material.texture, "the picture of a mesh or pattern")?,
+        };
+        textures.insert(key, texture.clone());
+        let first = order.len() as u32;
+        order.extend(members);
+        batches.push(upload_batch(gpu, mesh, texture, first..order.len() as u32));
+    }
+    Ok((batches, order))
+}
+
+fn upload_batch(gpu: &GpuContext, mesh: &Mesh, texture: wgpu::TextureView, members: Range<u32>) -> MeshBatch {
+    let (shape, material) = (&mesh.shape, &mesh.material);
+    let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
+    let [r, g, b] = material.emissive;
+    let uniform = [r, g, b, material.cutoff.unwrap_or(0.0)];
     let buffer = |label, contents: &[u8], usage| {
         gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
-    Ok(MeshBuffers {
-        vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&floats), wgpu::BufferUsages::VERTEX),
-        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&mesh.indices), wgpu::BufferUsages::INDEX),
-        count: mesh.indices.len() as u32,
+    MeshBatch {
+        vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&shape.indices), wgpu::BufferUsages::INDEX),
+        count: shape.indices.len() as u32,
         texture,
-        sampler: create_sampler(gpu, mesh.wrap),
-        origin_ned_m: mesh.origin_ned_m,
-    })
+        sampler: create_sampler(gpu, material.wrap, material.nearest),
+        material: buffer("camsim.mesh.material", bytemuck::cast_slice(&uniform), wgpu::BufferUsages::UNIFORM),
+        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some() },
+        members,
+    }
 }
 
 fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgpu::TextureView, GpuError> {

@@ -188,8 +188,8 @@ fn a_picture_repeats_where_its_mesh_says_so() {
     let unlike = |wrap: Wrap| {
         // Four copies of the picture over 400 m, one each 100 m: a period is 50 px from 200 m above ground. The middle is a seam.
         let mut scene = pattern(400.0);
-        scene.meshes[0].wrap = wrap;
-        for vertex in &mut scene.meshes[0].vertices {
+        scene.meshes[0].material.wrap = [wrap; 2];
+        for vertex in &mut std::sync::Arc::make_mut(&mut scene.meshes[0].shape).vertices {
             vertex.uv = vertex.uv.map(|t| 4.0 * t);
         }
         let sequence = sequence(scenario.clone(), steady(200.0, 0.0, DVec3::ZERO, DVec3::ZERO), scene);

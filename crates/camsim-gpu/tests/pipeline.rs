@@ -57,7 +57,7 @@ fn houses() -> Arc<Sequence> {
 /// Over ridges before the sky: silhouettes of ground alone.
 fn ridges() -> Arc<Sequence> {
     let heights: Vec<f64> = (0..65 * 65).map(|i| 40.0 * (f64::from(i / 65) * 0.4).sin().abs() + f64::from(i % 65) * 0.2).collect();
-    let terrain = Terrain::from_heights(65, 65, 10.0, &heights, Some(pattern(1.0).meshes[0].texture.clone())).expect("a terrain");
+    let terrain = Terrain::from_heights(65, 65, 10.0, &heights, Some(pattern(1.0).meshes[0].material.texture.clone())).expect("a terrain");
     let mut scenario = small();
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -15.0, 0.0], ..MountSpec::default() };
     sequence(scenario, steady(90.0, 0.0, DVec3::new(9.0, 2.0, 0.0), DVec3::ZERO), Scene { terrain: Some(terrain), ..Scene::default() })

@@ -32,11 +32,11 @@ fn plumb_wall(path: &CameraPath, t_s: f64) -> Scene {
     let half_m = 0.05 * DISTANCE_M;
     let corner = |u: f64, down: f64| {
         let at = right * (2.0 * u - 1.0) * half_m + DVec3::Z * down * DISTANCE_M;
-        MeshVertex { position_m: at.as_vec3().to_array(), uv: [u as f32, 0.5] }
+        MeshVertex::new(at.as_vec3().to_array(), [u as f32, 0.5])
     };
     let vertices = vec![corner(0.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0), corner(1.0, 1.0)];
     let origin_ned_m = pose.position_ned_m + level * DISTANCE_M;
-    Scene { meshes: vec![Mesh { vertices, indices: vec![0, 1, 2, 2, 1, 3], texture, origin_ned_m, wrap: Wrap::Clamp }], ..Scene::default() }
+    Scene { meshes: vec![Mesh::new(vertices, vec![0, 1, 2, 2, 1, 3], texture, origin_ned_m, Wrap::Clamp)], ..Scene::default() }
 }
 
 /// Columns where each row has brightness 1/2, to a fraction of a pixel.

@@ -64,16 +64,12 @@ fn building(centre: [f64; 2], half: [f64; 2], height: f64) -> Mesh {
     let corner = |i: u32| {
         let side = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
         let position_m = [(side(0) * half[0]) as f32, (side(1) * half[1]) as f32, if i >> 2 & 1 == 1 { -height as f32 } else { 0.0 }];
-        MeshVertex { position_m, uv: [0.5, 0.5] }
+        MeshVertex::new(position_m, [0.5, 0.5])
     };
     let quads = [[4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    Mesh {
-        vertices: (0..8).map(corner).collect(),
-        indices: quads.into_iter().flat_map(|[a, b, c, d]| [a, b, c, a, c, d]).collect(),
-        texture: Arc::new(Texture::uniform([200, 180, 160, 255], Encoding::Linear)),
-        origin_ned_m: DVec3::new(centre[0], centre[1], 0.0),
-        wrap: Wrap::Clamp,
-    }
+    let indices = quads.into_iter().flat_map(|[a, b, c, d]| [a, b, c, a, c, d]).collect();
+    let texture = Arc::new(Texture::uniform([200, 180, 160, 255], Encoding::Linear));
+    Mesh::new((0..8).map(corner).collect(), indices, texture, DVec3::new(centre[0], centre[1], 0.0), Wrap::Clamp)
 }
 
 fn buildings() -> Scene {

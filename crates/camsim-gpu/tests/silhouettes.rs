@@ -138,7 +138,7 @@ fn ridges() -> Scene {
             60.0 * (row * 0.35 + 0.4 * (column * 0.11).sin()).sin().abs() + 15.0 * (column * 0.21).cos()
         })
         .collect();
-    let texture = pattern(1.0).meshes[0].texture.clone();
+    let texture = pattern(1.0).meshes[0].material.texture.clone();
     Scene {
         terrain: Some(Terrain::from_heights(129, 129, 10.0, &heights, Some(texture)).expect("a terrain")),
         sky_linear: [1.0, 1.0, 1.0],

@@ -135,15 +135,11 @@ fn vibration_of_200_hz_within_the_exposure() {
 /// An upright wall to the north, seen by a camera that looks and flies north.
 fn wall(distance_m: f64) -> (Scene, Plane) {
     let half_m = 40.0;
-    let corner = |e: f32, d: f32| MeshVertex { position_m: [0.0, e, d], uv: [0.5 + e / 80.0, 0.5 + d / 80.0] };
+    let corner = |e: f32, d: f32| MeshVertex::new([0.0, e, d], [0.5 + e / 80.0, 0.5 + d / 80.0]);
     let h = half_m as f32;
-    let mesh = Mesh {
-        vertices: vec![corner(-h, -h), corner(h, -h), corner(h, h), corner(-h, h)],
-        indices: vec![0, 1, 2, 0, 2, 3],
-        texture: pattern(1.0).meshes[0].texture.clone(),
-        origin_ned_m: DVec3::new(distance_m, 0.0, -500.0),
-        wrap: Wrap::Clamp,
-    };
+    let vertices = vec![corner(-h, -h), corner(h, -h), corner(h, h), corner(-h, h)];
+    let texture = pattern(1.0).meshes[0].material.texture.clone();
+    let mesh = Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(distance_m, 0.0, -500.0), Wrap::Clamp);
     let plane = Plane { at_ned_m: mesh.origin_ned_m, normal_ned: DVec3::X, half_m };
     (Scene { meshes: vec![mesh], sky_linear: [0.2, 0.4, 0.8], ..Scene::default() }, plane)
 }

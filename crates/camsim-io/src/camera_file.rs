@@ -9,7 +9,7 @@ use camsim_core::camera::CameraModel;
 use camsim_core::scenario::{CameraSpec, LensModel};
 
 mod agisoft;
-mod document;
+pub(crate) mod document;
 mod gyroflow;
 mod kalibr;
 mod opencv;

@@ -7,6 +7,7 @@
 //! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
 //! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers only: 0.001 to 1e6
 //! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
+//! holes = "far"                      # where there is no depth; or "nearest": that of the nearest pixel that has one
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
 //! principal_point_px = [543.5, 407.5]  # default: its centre
 //! instant_ms = 0.0                   # when it was taken, from the stamp t_i
@@ -20,7 +21,8 @@
 //! # color = [0.5, 0.6, 0.7]          # stored values
 //! ```
 //!
-//! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone.
+//! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone,
+//! or, with `holes = "nearest"`, as what is beside it (a depth camera's shadows; not for pictures with sky).
 //! A picture of nothing but 0 and infinity may be sky; one of nothing but what no depth can be (negative, not a number, nearer than a
 //! micrometre) is refused: it is in another sign or unit.
 //!
@@ -100,6 +102,8 @@ struct FrameSpec {
     depth_per_metre: Option<f64>,
     #[serde(default)]
     depth_kind: DepthKind,
+    #[serde(default)]
+    holes: Holes,
     focal_px: [f64; 2],
     principal_point_px: Option<[f64; 2]>,
     #[serde(default)]
@@ -148,6 +152,14 @@ enum DepthKind {
     Range,
 }
 
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Holes {
+    #[default]
+    Far,
+    Nearest,
+}
+
 /// A frame file, read with everything that it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrameFile {
@@ -189,7 +201,7 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
     }
     let geometry = IdealGeometry { size_px, focal_px, principal_px };
     let motion = read_motion(&spec.motion, path)?;
-    let inverse_depth = match &spec.depth {
+    let mut inverse_depth = match &spec.depth {
         Some(depth) => depth::read_inverse_depth(depth, &spec, &geometry, path)?,
         None if motion.translates() => {
             return Err(fail(
@@ -207,6 +219,9 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
         None => None,
     };
     let without_depth = inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
+    if spec.holes == Holes::Nearest {
+        depth::fill_holes(&mut inverse_depth, size_px);
+    }
     let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, instant_s: 1e-3 * spec.instant_ms };
     Ok(FrameFile { frame, motion, fog, without_depth })
 }

@@ -16,6 +16,10 @@ pub mod terrain;
 
 pub mod pictures;
 
+pub mod board_file;
+
+pub mod gltf_file;
+
 pub mod load;
 
 pub mod builtin;

@@ -1,24 +1,30 @@
 //! A scenario's files, read, checked against each other, and brought to one local frame: what rendering starts from.
 
-use std::{cell::RefCell, path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc};
 
 use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
-    geodesy::{Geodetic, GeoidCache},
     mount::{CameraPath, MountError},
-    scenario::{FlightSpec, HeightReference, PatternCentre, Scenario},
-    scene::{Encoding, Mesh, Scene, linear_from_srgb},
+    scenario::{FlightSpec, HeightReference, Scenario},
     sequence::Sequence,
     tracker::{Tracked, TrackerError, track},
 };
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use crate::{
+    board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
-    pictures::{PictureError, read_gray_image, read_texture},
-    terrain::{TerrainFileError, TerrainSummary, read_terrain},
+    gltf_file::GltfError,
+    pictures::{PictureError, read_gray_image},
+    terrain::{TerrainFileError, TerrainSummary},
 };
+
+mod placements;
+mod scene;
+
+pub use scene::board_place;
+use scene::load_scene;
 
 /// Frames that a sequence may have: four days at 30 a second. More is a slip in `camera.fps`, and tables of it would not end.
 const MOST_FRAMES: f64 = 10e6;
@@ -46,14 +52,42 @@ pub enum LoadError {
         /// What is wrong.
         source: PictureError,
     },
-    /// A local log over a georeferenced terrain.
+    /// A local log over a georeferenced scene.
     #[error(
-        "{log} has local coordinates, but scene.terrain is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
+        "{log} has local coordinates, but {key} is georeferenced: set flight.origin = [lat_deg, lon_deg, height_m], the place on Earth of the log's (0, 0, 0)"
     )]
     NoOrigin {
         /// The log.
         log: PathBuf,
+        /// What has a place on Earth.
+        key: &'static str,
     },
+    /// A model.
+    #[error("scene.gltf: {0}")]
+    Gltf(#[from] GltfError),
+    /// A table of places.
+    #[error("{path}: {problem}")]
+    Placements {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        problem: String,
+    },
+    /// A place without ground.
+    #[error(
+        "scene.gltf: {file} is to stand on the ground, but there is none at north {north_m:.1} m, east {east_m:.1} m: move it onto the terrain, or leave on_ground out"
+    )]
+    NoGround {
+        /// The model.
+        file: PathBuf,
+        /// The place.
+        north_m: f64,
+        /// The place.
+        east_m: f64,
+    },
+    /// A calibration board.
+    #[error("scene.board: {0}")]
+    Board(#[from] BoardFileError),
     /// No frame falls into the window.
     #[error("flight.window_s = [{0}, {1}] holds no frame at {2} frames a second: make the window longer or camera.fps higher")]
     NoFrame(f64, f64, f64),
@@ -90,6 +124,8 @@ pub struct Loaded {
     pub terrain: Option<TerrainSummary>,
     /// What a user should know but need not stop for.
     pub warnings: Vec<String>,
+    /// Those of them that came with the scene.
+    scene_notes: Vec<String>,
 }
 
 /// Reads everything that a scenario names (paths as they stand).
@@ -122,11 +158,11 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     let same_scene = |before: &Loaded, of: &Scenario| {
         of.scene == scenario.scene && of.flight.height == scenario.flight.height && before.log.frame == log.frame
     };
-    let (scene, terrain) = match known.filter(|(before, of)| same_scene(before, of)) {
-        Some((before, _)) => (before.sequence.scene.clone(), before.terrain.clone()),
+    let (scene, terrain, scene_notes) = match known.filter(|(before, of)| same_scene(before, of)) {
+        Some((before, _)) => (before.sequence.scene.clone(), before.terrain.clone(), before.scene_notes.clone()),
         None => {
-            let (scene, terrain) = load_scene(scenario, &log)?;
-            (Arc::new(scene), terrain)
+            let (scene, terrain, notes) = load_scene(scenario, &log)?;
+            (Arc::new(scene), terrain, notes)
         }
     };
     let picture = &scenario.camera.photometric.vignette;
@@ -139,8 +175,9 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     let (start_s, frames) = frames_of_window(scenario, &log)?;
     let sequence =
         Sequence { scenario: scenario.clone(), path: Arc::new(path), epoch_ns: log.epoch_ns, start_s, frames, scene, vignette, zoom_track };
-    let warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
-    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings })
+    let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
+    warnings.extend(scene_notes.iter().cloned());
+    Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
 }
 
 /// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all of the log is tracked.
@@ -169,37 +206,6 @@ fn height_plan(scenario: &Scenario) -> (HeightConversion, bool) {
         (HeightReference::Ellipsoid, HeightReference::Msl) => (HeightConversion::None, true),
         _ => (HeightConversion::None, false),
     }
-}
-
-fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>), LoadError> {
-    let spec = &scenario.scene;
-    let mut scene = Scene {
-        sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
-        fog_visibility_m: spec.fog_visibility_m,
-        ..Scene::default()
-    };
-    let mut summary = None;
-    if let Some(terrain) = &spec.terrain {
-        let frame = log.frame.as_ref().ok_or_else(|| LoadError::NoOrigin { log: scenario.flight.log.clone() })?;
-        let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
-        // One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each thread that reads terrain.
-        thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
-        let undulation = |lat_rad, lon_rad| GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }));
-        let (_, shift_terrain) = height_plan(scenario);
-        let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
-        scene.terrain = Some(loaded.terrain);
-        summary = Some(loaded.summary);
-    }
-    if let Some(pattern) = &spec.pattern {
-        let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
-        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(of_pattern)?;
-        let centre = match pattern.at {
-            PatternCentre::Origin => DVec3::ZERO,
-            PatternCentre::Ned(ned) => DVec3::from_array(ned),
-        };
-        scene.meshes.push(Mesh::level_picture(Arc::new(texture), centre, pattern.width_m));
-    }
-    Ok((scene, summary))
 }
 
 /// Start (path time) and number of frames: frame i counts while its stamp is inside the window.

@@ -86,6 +86,19 @@ fn luma([r, g, b]: [f32; 3]) -> f32 {
     if r == g && g == b { r } else { 0.2126 * r + 0.7152 * g + 0.0722 * b }
 }
 
+/// A picture within another file.
+pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
+    let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    if reader.format().is_none() {
+        return Err("neither PNG nor JPEG".into());
+    }
+    let mut limits = image::Limits::default();
+    limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes.len() as u64)));
+    reader.limits(limits);
+    let picture = reader.decode().map_err(|error| error.to_string())?;
+    if picture.width() == 0 || picture.height() == 0 { Err("the picture has no pixel".into()) } else { Ok(picture) }
+}
+
 fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
     let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
     let mut reader =

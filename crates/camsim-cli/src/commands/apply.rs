@@ -27,6 +27,7 @@ FRAME.toml (paths relative to it):
   depth = \"depth.exr\"          EXR Z in metres, or 16-bit PNG or PGM with depth_per_metre (0.001 to 1e6), or 8-bit RGB PNG
                                with depth_encoding = \"packed24\"; positive forward, 0 is unknown or sky: infinitely far
   depth_kind = \"planar\"        | \"range\"
+  holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one
   focal_px = [307.6, 307.6]    of the ideal picture, which may be larger than the output
   principal_point_px = [543.5, 407.5]
   instant_ms = 0.0             when it was taken, from the stamp

@@ -11,7 +11,7 @@ use super::{BlurStage, Contours, FramePlan, SIZE_QUANTUM_PX, Skip};
 use crate::{
     pose::CameraPose,
     scenario::{QualitySpec, Silhouettes},
-    scene::{Aabb, CHUNK_CELLS, Mesh, Scene, Terrain, terrain::Frustum},
+    scene::{Aabb, CHUNK_CELLS, Mesh, Scene, Shape, Terrain, terrain::Frustum},
 };
 
 /// Cells along the side of a block that shares one slope bound.
@@ -102,7 +102,7 @@ struct MeshOutline {
 impl SceneOutline {
     pub(super) fn new(scene: &Scene) -> Self {
         let terrain = scene.terrain.as_ref().map_or_else(PatchTree::default, PatchTree::new);
-        let meshes = scene.meshes.iter().map(|mesh| MeshOutline { bounds: mesh_bounds(mesh), flat_convex: is_flat_convex(mesh) }).collect();
+        let meshes = scene.meshes.iter().map(|mesh| MeshOutline { bounds: mesh.bounds(), flat_convex: is_flat_convex(mesh) }).collect();
         Self { terrain, meshes }
     }
 
@@ -305,30 +305,25 @@ fn cell(corners: [DVec3; 4], at_rim: bool) -> Patch {
     patch
 }
 
-fn mesh_bounds(mesh: &Mesh) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    for vertex in 0..mesh.vertices.len() as u32 {
-        bounds.include(mesh.position_ned_m(vertex));
-    }
-    bounds
-}
-
 /// All triangles in one plane and turned the same way, and no corner outside of a border edge (one that a single triangle has).
 fn is_flat_convex(mesh: &Mesh) -> bool {
-    if mesh.vertices.len() > MAX_FLAT_VERTICES || mesh.indices.len() < 3 {
+    let Shape { vertices, indices } = &*mesh.shape;
+    // What has holes, or is not there from behind, covers nothing for certain.
+    let whole = mesh.material.cutoff.is_none() && !mesh.material.one_sided;
+    if vertices.len() > MAX_FLAT_VERTICES || indices.len() < 3 || !whole {
         return false;
     }
     let at = |vertex: u32| mesh.position_ned_m(vertex);
-    let mut normals = mesh.indices.chunks_exact(3).map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero());
+    let mut normals = indices.chunks_exact(3).map(|t| (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).normalize_or_zero());
     let Some(normal) = normals.next() else { return false };
-    let reach = mesh.indices.iter().map(|&v| at(v).distance(at(mesh.indices[0]))).fold(0.0, f64::max);
-    let flat = mesh.indices.iter().all(|&v| normal.dot(at(v) - at(mesh.indices[0])).abs() <= 1e-6 * reach);
+    let reach = indices.iter().map(|&v| at(v).distance(at(indices[0]))).fold(0.0, f64::max);
+    let flat = indices.iter().all(|&v| normal.dot(at(v) - at(indices[0])).abs() <= 1e-6 * reach);
     let turned_alike = normal != DVec3::ZERO && normals.all(|n| n.dot(normal) > 0.999);
-    let edges: Vec<[u32; 2]> = mesh.indices.chunks_exact(3).flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]).collect();
+    let edges: Vec<[u32; 2]> = indices.chunks_exact(3).flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]).collect();
     let border = edges.iter().filter(|[a, b]| !edges.contains(&[*b, *a]));
     let convex = |&[a, b]: &[u32; 2]| {
         let inward = normal.cross(at(b) - at(a)).normalize_or_zero();
-        mesh.indices.iter().all(|&v| inward.dot(at(v) - at(a)) >= -1e-6 * reach)
+        indices.iter().all(|&v| inward.dot(at(v) - at(a)) >= -1e-6 * reach)
     };
     flat && turned_alike && border.clone().count() >= 3 && { border }.all(convex)
 }
@@ -443,7 +438,7 @@ mod tests {
         assert!(!none(&two, &pose(200.0, -90.0)));
         // An arrow-shaped piece is flat, but may leave a gap between the corners.
         let mut arrow = picture;
-        arrow.vertices[0].position_m = [-100.0, 100.0, 0.0];
+        Arc::make_mut(&mut arrow.shape).vertices[0].position_m = [-100.0, 100.0, 0.0];
         assert!(!is_flat_convex(&arrow));
     }
 

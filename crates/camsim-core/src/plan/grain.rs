@@ -59,7 +59,7 @@ impl SceneGrain {
             known[known.len() - 1].clone()
         };
         let terrain = scene.terrain.as_ref().map(|terrain| of(&terrain.texture));
-        Self { terrain, meshes: scene.meshes.iter().map(|mesh| of(&mesh.texture)).collect() }
+        Self { terrain, meshes: scene.meshes.iter().map(|mesh| of(&mesh.material.texture)).collect() }
     }
 
     /// Of surface 0 (terrain) or 1 + i (mesh i).

@@ -1,13 +1,13 @@
 //! What the plan's rays meet: the terrain at full detail and every mesh.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::NEAR_M;
 use crate::{
     pose::CameraPose,
-    scene::{Aabb, Encoding, Mesh, Scene, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
+    scene::{Aabb, Encoding, Scene, Shape, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
 };
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -17,9 +17,11 @@ pub(super) const FOG_AT_VISIBILITY: f64 = 3.912;
 #[derive(Debug)]
 pub(super) struct Surfaces {
     scene: Arc<Scene>,
-    /// Mesh and place of the first corner in its indices.
-    triangles: Vec<(u32, u32)>,
+    /// Boxes around the meshes, and around the triangles of each mesh's shape: meshes that share a shape share its tree.
     tree: BoxTree,
+    shapes: Vec<Arc<BoxTree>>,
+    /// From NED to the axes of each mesh's shape.
+    shape_from_ned: Vec<DMat3>,
     /// Linear light of each byte of a picture, by [`Encoding`].
     linear: [(Encoding, [f32; 256]); 2],
 }
@@ -33,22 +35,32 @@ pub(super) struct Met {
     pub surface: usize,
     /// Texture coordinates there.
     pub uv: [f64; 2],
+    /// Factor of the texture's colour there.
+    pub tint: DVec3,
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
 }
 
 impl Surfaces {
     pub fn new(scene: Arc<Scene>) -> Self {
-        let of_mesh = |(i, mesh): (usize, &Mesh)| (0..mesh.indices.len() as u32 / 3).map(move |k| (i as u32, 3 * k)).collect::<Vec<_>>();
-        let triangles: Vec<(u32, u32)> = scene.meshes.iter().enumerate().flat_map(of_mesh).collect();
-        let bounds = |&(mesh, first): &(u32, u32)| {
-            let mut bounds = Aabb::EMPTY;
-            corners(&scene.meshes[mesh as usize], first).into_iter().for_each(|corner| bounds.include(corner));
-            bounds
+        let mut known: HashMap<*const Shape, Arc<BoxTree>> = HashMap::new();
+        let tree_of = |shape: &Shape| {
+            let triangle = |of: &[u32]| {
+                let mut bounds = Aabb::EMPTY;
+                let at = |&v: &u32| shape.vertices.get(v as usize).map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)));
+                of.iter().filter_map(at).for_each(|corner| bounds.include(corner));
+                // A ray in the shape's axes is rounded.
+                let hair = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
+                Aabb { min: bounds.min - hair, max: bounds.max + hair }
+            };
+            Arc::new(BoxTree::new(&shape.indices.chunks_exact(3).map(triangle).collect::<Vec<_>>()))
         };
-        let tree = BoxTree::new(&triangles.iter().map(bounds).collect::<Vec<_>>());
+        let shapes = scene.meshes.iter().map(|mesh| known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| tree_of(&mesh.shape)).clone());
+        let shapes = shapes.collect();
+        let tree = BoxTree::new(&scene.mesh_bounds());
+        let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
-        Self { scene, triangles, tree, linear }
+        Self { scene, tree, shapes, shape_from_ned, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
@@ -59,18 +71,27 @@ impl Surfaces {
     pub fn meet(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
         let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
-        let triangle = |triangle: u32, limit: f64| {
-            let (mesh, first) = self.triangles[triangle as usize];
-            let points = corners(&self.scene.meshes[mesh as usize], first);
-            intersect_triangle(points, origin_ned_m, direction_ned, limit).map(|(t, weights)| (t, (mesh as usize, first, weights)))
-        };
-        let of_mesh = self.tree.first(origin_ned_m, direction_ned, limit, triangle);
-        let on_mesh = of_mesh.map(|(depth_m, (mesh, first, weights))| {
-            let uv_of = |k: usize| self.scene.meshes[mesh].vertices[self.scene.meshes[mesh].indices[first as usize + k] as usize].uv;
-            let uv = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(uv_of(k)[axis])).sum());
-            Met { depth_m, surface: 1 + mesh, uv, terrain: None }
+        let on_mesh = self.tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
+            self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit).map(|met| (met.depth_m, met))
         });
-        on_mesh.or(ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, terrain: Some(hit) }))
+        let on_ground = || ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, tint: DVec3::ONE, terrain: Some(hit) });
+        on_mesh.map(|(_, met)| met).or_else(on_ground)
+    }
+
+    /// The boxes are met in the shape's own axes, the triangles where they stand: what is found there is the same for every way of storing it.
+    fn meet_mesh(&self, i: usize, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Option<Met> {
+        let mesh = &self.scene.meshes[i];
+        let shape_from_ned = self.shape_from_ned[i];
+        let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
+        let meet = |triangle: u32, limit: f64| {
+            let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+            let points = corners.map(|corner| mesh.position_ned_m(corner));
+            let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
+            mesh.shows(corners, weights, direction_ned).then_some((t, (corners, weights)))
+        };
+        let (depth_m, (corners, weights)) = self.shapes[i].first(origin, direction, limit, meet)?;
+        let [r, g, b, _] = mesh.tint_at(corners, weights);
+        Some(Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: DVec3::new(r, g, b), terrain: None })
     }
 
     /// Place in the picture on what a ray met, texels.
@@ -95,11 +116,13 @@ impl Surfaces {
             .scene
             .fog_visibility_m
             .map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * met.depth_m * range_per_depth / visibility_m).exp());
-        sky + clear * (DVec3::new(light(0), light(1), light(2)) - sky)
+        let own = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map_or([0.0; 3], |mesh| mesh.material.emissive);
+        let light = met.tint * DVec3::new(light(0), light(1), light(2)) + DVec3::from_array(own.map(f64::from));
+        sky + clear * (light - sky)
     }
 
     fn texture(&self, met: &Met) -> Option<&Texture> {
-        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &*mesh.texture);
+        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &*mesh.material.texture);
         of_mesh.or(self.terrain().map(|terrain| &*terrain.texture))
     }
 
@@ -109,15 +132,16 @@ impl Surfaces {
         let r2 = tangents[0].abs().max(tangents[1].abs()).powi(2) + tangents[2].abs().max(tangents[3].abs()).powi(2);
         let terrain = self.terrain().map_or(f64::INFINITY, |terrain| terrain.min_distance_in_view_m(pose, tangents));
         let frustum = Frustum::new(pose, tangents);
-        let meshes = self.tree.nearest_box_m(pose.position_ned_m, |bounds| frustum.may_see(bounds));
+        let measure = |bounds: &Aabb| frustum.may_see(bounds).then(|| bounds.distance_m(pose.position_ned_m));
+        // The boxes of a shape's triangles, as they stand.
+        let of_mesh = |i: u32| {
+            let mesh = &self.scene.meshes[i as usize];
+            self.shapes[i as usize].nearest_box_m(|own| measure(&own.turned(mesh.ned_from_shape, mesh.origin_ned_m)))
+        };
+        let meshes = self.tree.nearest_thing_m(measure, of_mesh);
         // Slant range to planar depth by the widest ray; the camera may come closer within the window.
         ((terrain.min(meshes) - travel_m) / (1.0 + r2).sqrt()).max(2.0 * NEAR_M)
     }
-}
-
-/// NED, metres.
-fn corners(mesh: &Mesh, first: u32) -> [DVec3; 3] {
-    [0, 1, 2].map(|k| mesh.position_ned_m(mesh.indices[first as usize + k]))
 }
 
 #[cfg(test)]
@@ -127,7 +151,7 @@ mod tests {
     use glam::{DQuat, EulerRot};
 
     use super::*;
-    use crate::scene::{Encoding, Texture};
+    use crate::scene::{Encoding, Mesh, Texture};
 
     /// Waves of 30 m under three pictures at different heights, one of them tilted.
     fn scene() -> Scene {
@@ -135,13 +159,16 @@ mod tests {
         let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
         let picture = |north_m: f64, height_m: f64| Mesh::level_picture(texture.clone(), DVec3::new(north_m, 10.0, -height_m), 60.0);
         let mut meshes = vec![picture(-100.0, 40.0), picture(0.0, 60.0), picture(100.0, 5.0)];
-        meshes[1].vertices[0].position_m[2] = 25.0;
+        Arc::make_mut(&mut meshes[1].shape).vertices[0].position_m[2] = 25.0;
         Scene { terrain: Some(Terrain::from_heights(97, 97, 10.0, &heights, None).unwrap()), meshes, ..Scene::default() }
     }
 
     #[test]
     fn rays_meet_what_a_look_at_every_triangle_finds() {
-        let scene = scene();
+        let mut scene = scene();
+        // A picture again, turned, as a mesh of the same shape.
+        let ned_from_shape = DMat3::from_rotation_z(0.5) * DMat3::from_rotation_x(0.4) * 1.3;
+        scene.meshes.push(Mesh { ned_from_shape, origin_ned_m: DVec3::new(-40.0, -50.0, -70.0), ..scene.meshes[1].clone() });
         let terrain = scene.terrain.as_ref().unwrap();
         let of_terrain: Vec<[DVec3; 3]> = (0..terrain.chunks.len() as u32)
             .flat_map(|chunk| {
@@ -189,9 +216,10 @@ mod tests {
                 * DQuat::from_mat3(&glam::DMat3::from_cols(DVec3::Y, DVec3::Z, DVec3::X)),
         };
         let view = [-0.5, 0.5, -0.5, 0.5];
-        // The middle picture is 100 m below, the corner of another 25 m nearer than its centre would be, at a slant of at most sqrt(1.5).
+        // The middle picture is 100 m below, the corner of another 25 m nearer than its centre would be, at a slant of at most sqrt(1.5). Boxes are
+        // larger by 1e-9 of their reach of 30 m.
         let down = surfaces.nearest_m(&pose(-90.0), view, 1.0);
-        assert!(down <= 99.0 && down >= 99.0 / 1.5_f64.sqrt() - 1e-9, "{down}");
+        assert!(down <= 99.0 && down >= 99.0 / 1.5_f64.sqrt() - 3.1e-8, "{down}");
         assert_eq!(surfaces.nearest_m(&pose(60.0), view, 1.0), f64::INFINITY);
     }
 }

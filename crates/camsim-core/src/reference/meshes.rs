@@ -1,12 +1,15 @@
 //! Rays against meshes: a tree of boxes over all triangles.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::{
     Hit,
+    paint::Coat,
     ray::{Bounds, Ray, meet},
 };
-use crate::scene::Mesh;
+use crate::scene::{Mesh, Shape};
 
 /// Triangles of a leaf, at most.
 const LEAF: usize = 4;
@@ -16,8 +19,19 @@ const STACK: usize = 64;
 #[derive(Clone, Copy, Debug)]
 struct Triangle {
     corners: [DVec3; 3],
-    uv: [[f32; 2]; 3],
+    /// 1 + place of its mesh.
     surface: u32,
+    /// Place of its first corner in the indices.
+    first: u32,
+}
+
+/// What a triangle's mesh says of it.
+#[derive(Debug)]
+struct Cover {
+    shape: Arc<Shape>,
+    one_sided: bool,
+    /// The picture and the alpha below which there is a hole.
+    holes: Option<(Coat, f64)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -34,31 +48,40 @@ struct Node {
 pub(super) struct Meshes {
     triangles: Vec<Triangle>,
     nodes: Vec<Node>,
+    /// By mesh.
+    covers: Vec<Cover>,
 }
 
 impl Meshes {
     pub(super) fn new(meshes: &[Mesh]) -> Self {
         let mut triangles = Vec::new();
         for (surface, mesh) in (1..).zip(meshes) {
-            for of in mesh.indices.chunks_exact(3) {
+            let Shape { vertices, indices } = &*mesh.shape;
+            for (first, of) in (0..).step_by(3).zip(indices.chunks_exact(3)) {
                 let of = [of[0], of[1], of[2]];
-                if of.iter().any(|&corner| corner as usize >= mesh.vertices.len()) {
+                if of.iter().any(|&corner| corner as usize >= vertices.len()) {
                     continue;
                 }
                 let corners = of.map(|corner| {
-                    let [n, e, d] = mesh.vertices[corner as usize].position_m.map(f64::from);
-                    mesh.origin_ned_m + DVec3::new(n, e, d)
+                    let [x, y, z] = vertices[corner as usize].position_m.map(f64::from);
+                    mesh.origin_ned_m + mesh.ned_from_shape * DVec3::new(x, y, z)
                 });
                 if corners.iter().all(|corner| corner.is_finite()) {
-                    triangles.push(Triangle { corners, uv: of.map(|corner| mesh.vertices[corner as usize].uv), surface });
+                    triangles.push(Triangle { corners, surface, first });
                 }
             }
         }
+        let cover = |mesh: &Mesh| Cover {
+            shape: mesh.shape.clone(),
+            one_sided: mesh.material.one_sided,
+            holes: mesh.material.cutoff.map(|cutoff| (Coat::new(&mesh.material), f64::from(cutoff))),
+        };
+        let covers = meshes.iter().map(cover).collect();
         let mut nodes = Vec::new();
         if !triangles.is_empty() {
             build(&mut triangles, 0, &mut nodes);
         }
-        Self { triangles, nodes }
+        Self { triangles, nodes, covers }
     }
 
     /// The first meeting before `limit`.
@@ -81,9 +104,10 @@ impl Meshes {
             let node = &self.nodes[index as usize];
             if node.count > 0 {
                 for triangle in &self.triangles[node.next as usize..(node.next + node.count) as usize] {
-                    if let Some((t, weights)) = meet(triangle.corners.map(|corner| ray.see(corner)), limit) {
-                        limit = t;
-                        best = Some(ray_hit(ray, t, weights, triangle.uv, triangle.surface));
+                    let met = meet(triangle.corners.map(|corner| ray.see(corner)), limit);
+                    if let Some(hit) = met.and_then(|(t, weights)| self.hit(ray, triangle, t, weights)) {
+                        limit = hit.depth_m;
+                        best = Some(hit);
                     }
                 }
                 continue;
@@ -107,10 +131,29 @@ impl Meshes {
     }
 }
 
+impl Meshes {
+    /// `None` where the ray passes a hole, or comes from the side that is not there.
+    fn hit(&self, ray: &Ray, triangle: &Triangle, t: f64, weights: [f64; 3]) -> Option<Hit> {
+        let cover = &self.covers[triangle.surface as usize - 1];
+        let [a, b, c] = triangle.corners;
+        if cover.one_sided && (b - a).cross(c - a).dot(ray.direction) >= 0.0 {
+            return None;
+        }
+        let of = [0, 1, 2].map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
+        let [red, green, blue, alpha] =
+            [0, 1, 2, 3].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(of[corner].tint[k])).sum());
+        let hit = ray_hit(ray, t, weights, of.map(|vertex| vertex.uv), triangle.surface);
+        if cover.holes.as_ref().is_some_and(|(coat, cutoff)| coat.alpha_at(hit.texture_uv) * alpha < *cutoff) {
+            return None;
+        }
+        Some(Hit { tint: [red, green, blue], ..hit })
+    }
+}
+
 /// The hit of a ray on a triangle.
 pub(super) fn ray_hit(ray: &Ray, t: f64, weights: [f64; 3], uv: [[f32; 2]; 3], surface: u32) -> Hit {
     let texture_uv = [0, 1].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(uv[corner][k])).sum());
-    Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, surface }
+    Hit { point_ned_m: ray.origin + t * ray.direction, depth_m: t, texture_uv, tint: [1.0; 3], surface }
 }
 
 /// Halves at the middle triangle along the longest side of the box around the triangles' centres.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::Hit;
-use crate::scene::{Encoding, Scene, Texture, Wrap};
+use crate::scene::{Encoding, Material, Scene, Texture, Wrap};
 
 /// What is left of a contrast at the visibility range: 2 %, whose logarithm is -3.912.
 const FOG_AT_VISIBILITY: f64 = 3.912;
@@ -19,17 +19,20 @@ pub(super) struct Paint {
     fog_per_m: f64,
 }
 
+/// What a surface is covered with.
 #[derive(Debug)]
-struct Coat {
+pub(super) struct Coat {
     texture: Arc<Texture>,
-    wrap: Wrap,
+    wrap: [Wrap; 2],
+    nearest: bool,
+    emissive: DVec3,
     linear: [f64; 256],
 }
 
 impl Paint {
     pub(super) fn new(scene: &Scene) -> Self {
-        let ground = scene.terrain.as_ref().map(|terrain| Coat::new(&terrain.texture, Wrap::Clamp));
-        let meshes = scene.meshes.iter().map(|mesh| Some(Coat::new(&mesh.texture, mesh.wrap)));
+        let ground = scene.terrain.as_ref().map(|terrain| Coat::new(&Material::picture(terrain.texture.clone(), Wrap::Clamp)));
+        let meshes = scene.meshes.iter().map(|mesh| Some(Coat::new(&mesh.material)));
         Self {
             surfaces: std::iter::once(ground).chain(meshes).collect(),
             sky: DVec3::from_array(scene.sky_linear.map(f64::from)),
@@ -42,7 +45,7 @@ impl Paint {
         let Some((hit, coat)) = hit.and_then(|hit| Some((hit, self.surfaces.get(hit.surface as usize)?.as_ref()?))) else {
             return self.sky;
         };
-        let color = coat.at(hit.texture_uv);
+        let color = DVec3::from_array(hit.tint) * coat.color_at(hit.texture_uv) + coat.emissive;
         if self.fog_per_m > 0.0 {
             let clear = (-self.fog_per_m * hit.depth_m * range_per_depth).exp();
             self.sky + clear * (color - self.sky)
@@ -53,43 +56,50 @@ impl Paint {
 }
 
 impl Coat {
-    fn new(texture: &Arc<Texture>, wrap: Wrap) -> Self {
+    pub(super) fn new(material: &Material) -> Self {
         let linear = std::array::from_fn(|byte| {
             let stored = byte as f64 / 255.0;
-            match texture.encoding {
+            match material.texture.encoding {
                 Encoding::Linear => stored,
                 Encoding::Srgb if stored <= 0.040_45 => stored / 12.92,
                 Encoding::Srgb => ((stored + 0.055) / 1.055).powf(2.4),
             }
         });
-        Self { texture: texture.clone(), wrap, linear }
+        let emissive = DVec3::from_array(material.emissive.map(f64::from));
+        Self { texture: material.texture.clone(), wrap: material.wrap, nearest: material.nearest, emissive, linear }
     }
 
-    /// Bilinear between texel centres.
-    fn at(&self, [u, v]: [f64; 2]) -> DVec3 {
+    fn color_at(&self, uv: [f64; 2]) -> DVec3 {
+        self.read(uv, |pixel| DVec3::new(self.linear[pixel[0] as usize], self.linear[pixel[1] as usize], self.linear[pixel[2] as usize]))
+    }
+
+    /// 0..=1.
+    pub(super) fn alpha_at(&self, uv: [f64; 2]) -> f64 {
+        self.read(uv, |pixel| DVec3::splat(f64::from(pixel[3]) / 255.0)).x
+    }
+
+    /// Bilinear between texel centres, or the nearest of them.
+    fn read(&self, [u, v]: [f64; 2], value: impl Fn(&[u8]) -> DVec3) -> DVec3 {
         let [width, height] = self.texture.size_px;
-        let (x0, x1, tx) = self.axis(u, width);
-        let (y0, y1, ty) = self.axis(v, height);
-        let top = self.texel(x0, y0) * (1.0 - tx) + self.texel(x1, y0) * tx;
-        let bottom = self.texel(x0, y1) * (1.0 - tx) + self.texel(x1, y1) * tx;
+        let texel = |x: usize, y: usize| {
+            let at = 4 * (y * width as usize + x);
+            value(&self.texture.rgba8[at..at + 4])
+        };
+        let (x0, x1, tx) = self.axis(u, width, self.wrap[0]);
+        let (y0, y1, ty) = self.axis(v, height, self.wrap[1]);
+        if self.nearest {
+            return texel(if tx < 0.5 { x0 } else { x1 }, if ty < 0.5 { y0 } else { y1 });
+        }
+        let top = texel(x0, y0) * (1.0 - tx) + texel(x1, y0) * tx;
+        let bottom = texel(x0, y1) * (1.0 - tx) + texel(x1, y1) * tx;
         top * (1.0 - ty) + bottom * ty
     }
 
     /// The two texels about a coordinate, and the share of the second.
-    fn axis(&self, coordinate: f64, size: u32) -> (usize, usize, f64) {
+    fn axis(&self, coordinate: f64, size: u32, wrap: Wrap) -> (usize, usize, f64) {
         let at = coordinate * f64::from(size) - 0.5;
         let at = if at.is_finite() { at } else { 0.0 };
         let below = at.floor();
-        let wrapped = |texel: f64| match self.wrap {
-            Wrap::Clamp => texel.clamp(0.0, f64::from(size) - 1.0) as usize,
-            Wrap::Repeat => (texel.rem_euclid(f64::from(size)) as usize).min(size as usize - 1),
-        };
-        (wrapped(below), wrapped(below + 1.0), at - below)
-    }
-
-    fn texel(&self, x: usize, y: usize) -> DVec3 {
-        let at = 4 * (y * self.texture.size_px[0] as usize + x);
-        let rgb = &self.texture.rgba8[at..at + 3];
-        DVec3::new(self.linear[rgb[0] as usize], self.linear[rgb[1] as usize], self.linear[rgb[2] as usize])
+        (wrap.texel(below, size), wrap.texel(below + 1.0, size), at - below)
     }
 }

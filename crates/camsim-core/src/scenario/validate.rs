@@ -3,9 +3,12 @@
 use std::fmt;
 
 use super::{
-    Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec,
+    Auto, Axis, BoardSpec, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec,
 };
-use crate::plan::MAX_KEYS;
+use crate::{
+    plan::MAX_KEYS,
+    scene::{Board, BoardError},
+};
 
 /// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
 pub const MAX_ITERATIONS: u32 = 64;
@@ -195,9 +198,26 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
 
 fn check_scene(check: &mut Check, scenario: &Scenario) {
     let scene = &scenario.scene;
-    check.require(scene.terrain.is_some() || scene.pattern.is_some(), "scene", || {
-        "is empty; give scene.terrain = { dem = \"dem.tif\" } or scene.pattern = { image = \"grid.png\", width_m = 100.0 }".into()
+    let has_surface = scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
+    check.require(has_surface, "scene", || {
+        "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 }, a [scene.board] or a [[scene.gltf]]"
+            .into()
     });
+    for (i, model) in scene.gltf.iter().enumerate() {
+        let table = format!("scene.gltf.{i}");
+        check_place(check, &table, model.at, model.geodetic);
+        check.finite(format!("{table}.heading_deg"), &[model.heading_deg]);
+        check.positive(format!("{table}.scale"), model.scale, "1 is as the file has it");
+        check.finite(format!("{table}.time_s"), &[model.time_s.unwrap_or(0.0)]);
+        check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
+            "needs a terrain to stand on: give scene.terrain, or heights in the places".into()
+        });
+        let twice = model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
+        check.require(!twice, format!("{table}.placements"), || "takes the place of at and geodetic: leave those out".into());
+    }
+    if let Some(board) = &scene.board {
+        check_board(check, board);
+    }
     if let Some(pattern) = &scene.pattern {
         check.positive("scene.pattern.width_m", pattern.width_m, "give the width on the ground in metres");
         if let PatternCentre::Ned(centre) = pattern.at {
@@ -209,6 +229,34 @@ fn check_scene(check: &mut Check, scenario: &Scenario) {
     });
     if let Some(visibility_m) = scene.fog_visibility_m {
         check.positive("scene.fog_visibility_m", visibility_m, "leave it out for clear air");
+    }
+}
+
+fn check_board(check: &mut Check, board: &BoardSpec) {
+    if board.target.is_none() {
+        if let Err(BoardError { key, message }) = Board::from_spec(board) {
+            check.fail(format!("scene.board.{key}"), message);
+        }
+    } else {
+        let given = board.kind.is_some() || board.columns.is_some() || board.rows.is_some() || board.size_m.is_some();
+        check.require(!given, "scene.board.target", || "takes the place of kind, columns, rows and size_m: leave those out".into());
+    }
+    check_place(check, "scene.board", board.at, board.geodetic);
+    check.finite("scene.board.angles_deg", &board.angles_deg);
+}
+
+/// Where something stands: in local north-east-down or on Earth, not both.
+fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
+    if let PatternCentre::Ned(centre) = at {
+        check.finite(format!("{table}.at"), &centre);
+    }
+    if let Some([lat_deg, lon_deg, height_m]) = geodetic {
+        let key = format!("{table}.geodetic");
+        let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();
+        check.require(ok, key.clone(), || {
+            format!("must be [latitude_deg -90..90, longitude_deg, height_m], not [{lat_deg}, {lon_deg}, {height_m}]")
+        });
+        check.require(at == PatternCentre::Origin, key, || format!("takes the place of {table}.at: leave one of them out"));
     }
 }
 
@@ -278,7 +326,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{FlightSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{FlightSpec, GltfSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
 
     fn good() -> Scenario {
         Scenario {
@@ -301,6 +349,21 @@ mod tests {
             },
             quality: Default::default(),
             output: Default::default(),
+        }
+    }
+
+    fn model() -> GltfSpec {
+        GltfSpec {
+            file: "a.glb".into(),
+            at: Default::default(),
+            geodetic: None,
+            placements: None,
+            heading_deg: 0.0,
+            scale: 1.0,
+            on_ground: false,
+            scene: None,
+            time_s: None,
+            animation: None,
         }
     }
 
@@ -351,6 +414,23 @@ mod tests {
             ("camera.photometric.light", |s| s.camera.photometric.light = -1.0),
             ("camera.photometric.noise_sigma", |s| s.camera.photometric.noise_sigma = f64::NAN),
             ("scene", |s| s.scene.pattern = None),
+            ("scene.gltf.0.scale", |s| s.scene.gltf = vec![GltfSpec { scale: 0.0, ..model() }]),
+            ("scene.gltf.0.on_ground", |s| s.scene.gltf = vec![GltfSpec { on_ground: true, ..model() }]),
+            ("scene.gltf.1.placements", |s| {
+                s.scene.gltf = vec![model(), GltfSpec { geodetic: Some([1.0; 3]), placements: Some("a.csv".into()), ..model() }];
+            }),
+            ("scene.board.kind", |s| s.scene.board = Some(BoardSpec::default())),
+            ("scene.board.target", |s| {
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), rows: Some(3), ..BoardSpec::default() });
+            }),
+            ("scene.board.angles_deg", |s| {
+                let angles_deg = [0.0, f64::NAN, 0.0];
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), angles_deg, ..BoardSpec::default() });
+            }),
+            ("scene.board.geodetic", |s| {
+                let geodetic = Some([91.0, 8.0, 400.0]);
+                s.scene.board = Some(BoardSpec { target: Some("a.yaml".into()), geodetic, ..BoardSpec::default() });
+            }),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("quality.preset", |s| {

@@ -87,18 +87,27 @@ impl BoxTree {
         best
     }
 
-    /// Distance from a point to the nearest leaf's box among those that `accept` takes; infinite without one. Boxes that hold others must be
-    /// accepted if one of those is.
-    pub fn nearest_box_m(&self, point: DVec3, accept: impl Fn(&Aabb) -> bool) -> f64 {
+    /// The smallest of what `measure` says of the leaves' boxes, infinite without any. `None` leaves out a box and all in it; a box must not be
+    /// farther than those in it.
+    pub fn nearest_box_m(&self, measure: impl Fn(&Aabb) -> Option<f64>) -> f64 {
+        self.nearest(&measure, |node| measure(&node.bounds).unwrap_or(f64::INFINITY))
+    }
+
+    /// The same with what `of_thing` says of the things themselves.
+    pub fn nearest_thing_m(&self, measure: impl Fn(&Aabb) -> Option<f64>, of_thing: impl Fn(u32) -> f64) -> f64 {
+        let things = |node: &Node| &self.things[node.next as usize..(node.next + node.count) as usize];
+        self.nearest(&measure, |node| things(node).iter().map(|&thing| of_thing(thing)).fold(f64::INFINITY, f64::min))
+    }
+
+    fn nearest(&self, measure: &impl Fn(&Aabb) -> Option<f64>, of_leaf: impl Fn(&Node) -> f64) -> f64 {
         let mut nearest = f64::INFINITY;
         let mut stack: Vec<usize> = self.nodes.first().map(|_| 0).into_iter().collect();
         while let Some(at) = stack.pop() {
             let node = &self.nodes[at];
-            let distance = node.bounds.distance_m(point);
             // Written so that a NaN distance goes nowhere.
-            if distance < nearest && accept(&node.bounds) {
+            if measure(&node.bounds).is_some_and(|distance| distance < nearest) {
                 if node.count > 0 {
-                    nearest = distance;
+                    nearest = nearest.min(of_leaf(node));
                 } else {
                     stack.extend([node.next as usize, at + 1]);
                 }
@@ -140,8 +149,10 @@ mod tests {
                 met += u32::from(found.is_some());
                 // A leaf's box holds up to four: not farther than the nearest, and nothing nearer than the leaf.
                 let nearest = boxes.iter().map(|of| of.distance_m(origin)).fold(f64::INFINITY, f64::min);
-                assert!(tree.nearest_box_m(origin, |_| true) <= nearest);
-                assert_eq!(tree.nearest_box_m(origin, |_| false), f64::INFINITY);
+                assert!(tree.nearest_box_m(|bounds| Some(bounds.distance_m(origin))) <= nearest);
+                let of_thing = |thing: u32| boxes[thing as usize].distance_m(origin);
+                assert_eq!(tree.nearest_thing_m(|bounds| Some(bounds.distance_m(origin)), of_thing), nearest);
+                assert_eq!(tree.nearest_box_m(|_| None), f64::INFINITY);
             }
             assert!(count < 300 || met > 50, "{met}");
         }

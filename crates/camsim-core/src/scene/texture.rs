@@ -35,6 +35,35 @@ impl Encoding {
     }
 }
 
+/// What a texture shows outside of 0..=1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The nearest border pixel.
+    #[default]
+    Clamp,
+    /// The picture again.
+    Repeat,
+    /// The picture again, every other time turned over.
+    Mirror,
+}
+
+impl Wrap {
+    /// The pixel of a row of `size` that is shown at a place of the endless row.
+    pub fn texel(self, at: f64, size: u32) -> usize {
+        let last = f64::from(size) - 1.0;
+        let within = match self {
+            Self::Clamp => at,
+            Self::Repeat => at.rem_euclid(f64::from(size)),
+            Self::Mirror => {
+                let twice = at.rem_euclid(2.0 * f64::from(size));
+                twice.min(2.0 * f64::from(size) - 1.0 - twice)
+            }
+        };
+        // What is not a number shows the first.
+        within.clamp(0.0, last.max(0.0)) as usize
+    }
+}
+
 /// Linear light of an sRGB value in 0..=1 (IEC 61966-2-1).
 pub fn linear_from_srgb(stored: f32) -> f32 {
     if stored <= 0.04045 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
@@ -87,6 +116,22 @@ impl Texture {
     /// One pixel of one colour.
     pub fn uniform(rgba: [u8; 4], encoding: Encoding) -> Self {
         Self { size_px: [1, 1], rgba8: rgba.to_vec(), encoding }
+    }
+
+    /// Alpha at texture coordinates, 0..=1: bilinear, or that of the nearest pixel.
+    pub(crate) fn alpha_at(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool) -> f64 {
+        let at = [0, 1].map(|k: usize| uv[k] * f64::from(self.size_px[k]) - 0.5);
+        let read = |x: f64, y: f64| {
+            let index = wrap[1].texel(y, self.size_px[1]) * self.size_px[0] as usize + wrap[0].texel(x, self.size_px[0]);
+            self.rgba8.get(4 * index + 3).map_or(1.0, |&byte| f64::from(byte) / 255.0)
+        };
+        if nearest {
+            return read((at[0] + 0.5).floor(), (at[1] + 0.5).floor());
+        }
+        let (x, y) = (at[0].floor(), at[1].floor());
+        let (tx, ty) = (at[0] - x, at[1] - y);
+        let row = |y: f64| read(x, y) * (1.0 - tx) + read(x + 1.0, y) * tx;
+        row(y) * (1.0 - ty) + row(y + 1.0) * ty
     }
 
     /// The levels 1, 2, ... down to 1x1 (level 0 is the texture itself); each side is half of the level above, rounded down, at least 1.
@@ -205,6 +250,15 @@ mod tests {
             let linear = linear_from_srgb(f32::from(byte) / 255.0);
             assert_eq!(Encoding::Srgb.encode_byte(linear), byte);
         }
+    }
+
+    #[test]
+    fn pictures_go_on_as_they_wrap() {
+        let row = |wrap: Wrap| (-4..6).map(|at| wrap.texel(f64::from(at), 3)).collect::<Vec<_>>();
+        assert_eq!(row(Wrap::Clamp), [0, 0, 0, 0, 0, 1, 2, 2, 2, 2]);
+        assert_eq!(row(Wrap::Repeat), [2, 0, 1, 2, 0, 1, 2, 0, 1, 2]);
+        assert_eq!(row(Wrap::Mirror), [2, 2, 1, 0, 0, 1, 2, 2, 1, 0]);
+        assert_eq!(Wrap::Mirror.texel(f64::NAN, 3), 0);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use camsim_core::{
     mount::CameraPath,
     pose::BodyState,
     scenario::{FlightSpec, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
-    scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, Texture},
+    scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, Texture, Wrap},
     sequence::Sequence,
     trajectory::Trajectory,
 };
@@ -128,14 +128,11 @@ pub fn block(at: DVec3, half_m: f64, height_m: f64) -> Mesh {
     let corner = |k: u32| {
         let side = |bit: u32| if k >> bit & 1 == 1 { half_m as f32 } else { -half_m as f32 };
         let down = if k >> 2 & 1 == 1 { -height_m as f32 } else { 0.0 };
-        MeshVertex { position_m: [side(0), side(1), down], uv: [(k & 1) as f32, (k >> 1 & 1) as f32] }
+        MeshVertex::new([side(0), side(1), down], [(k & 1) as f32, (k >> 1 & 1) as f32])
     };
     let faces: [[u32; 4]; 5] = [[4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
-    Mesh {
-        vertices: (0..8).map(corner).collect(),
-        indices: faces.iter().flat_map(|f| [f[0], f[1], f[2], f[0], f[2], f[3]]).collect(),
-        ..Mesh::level_picture(checker(2), at, 1.0)
-    }
+    let indices = faces.iter().flat_map(|f| [f[0], f[1], f[2], f[0], f[2], f[3]]).collect();
+    Mesh::new((0..8).map(corner).collect(), indices, checker(2), at, Wrap::Clamp)
 }
 
 pub fn rolling(exposure_ms: f64) -> ShutterSpec {

@@ -1,11 +1,15 @@
 //! What draws a key's surfaces: where they stand is written first, once for all passes that draw them.
 
-use camsim_core::scene::PlacedMesh;
+use camsim_core::{
+    pose::CameraPose,
+    scene::{PlacedMesh, in_view},
+};
 use glam::DVec3;
 
-use super::{IdealSlot, PLACEMENT_STRIDE, SurfacePipelines, near_marks::Kept};
+use super::{IdealSlot, SurfacePipelines, near_marks::Kept};
 use crate::{
     context::{GpuContext, GpuError},
+    layout::MeshPlacement,
     recorder::Recorder,
     tiles::TilePool,
     upload::{GroundPicture, SceneBuffers, TerrainBuffers},
@@ -14,24 +18,43 @@ use crate::{
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
 
-/// Writes where the meshes stand from a key.
-pub(super) fn place_meshes(recorder: &mut Recorder<'_>, slot: &IdealSlot, buffers: &SceneBuffers, base_ned_m: DVec3) {
-    for (mesh, i) in buffers.meshes.iter().zip(0_u64..) {
-        let origin = (mesh.origin_ned_m - base_ned_m).as_vec3().extend(0.0).to_array();
-        recorder.write(&slot.placements, i * PLACEMENT_STRIDE, bytemuck::cast_slice(&origin));
+/// Writes where the meshes stand that may be in view from a key, and which of each batch they are.
+pub(super) fn place_meshes(
+    recorder: &mut Recorder<'_>,
+    slot: &mut IdealSlot,
+    buffers: &SceneBuffers,
+    pose: &CameraPose,
+    tangents: [f64; 4],
+    base_ned_m: DVec3,
+) {
+    let seen = in_view(&buffers.bounds, pose, tangents);
+    let placement = |&i: &u32| {
+        let shape = &buffers.placed[i as usize];
+        let origin = (shape.origin_ned_m - base_ned_m).as_vec3();
+        let row = |axis: usize| shape.ned_from_shape.row(axis).as_vec3().extend(origin[axis]).to_array();
+        MeshPlacement { x: row(0), y: row(1), z: row(2) }
+    };
+    let placements: Vec<MeshPlacement> = seen.iter().map(placement).collect();
+    if !placements.is_empty() {
+        recorder.write(&slot.placements, 0, bytemuck::cast_slice(&placements));
     }
+    let place = |member: u32| seen.partition_point(|&i| i < member) as u32;
+    slot.drawn = buffers.batches.iter().map(|batch| place(batch.members.start)..place(batch.members.end)).collect();
 }
 
 pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, buffers: &SceneBuffers) {
-    if buffers.meshes.is_empty() {
-        return;
-    }
-    pass.set_pipeline(&pipelines.mesh);
-    for (mesh, group) in buffers.meshes.iter().zip(&slot.mesh_groups) {
+    let mut last = None;
+    for ((batch, group), instances) in buffers.batches.iter().zip(&slot.mesh_groups).zip(&slot.drawn) {
+        let Some(pipeline) = pipelines.meshes.get(&batch.kind).filter(|_| !instances.is_empty()) else { continue };
+        if last != Some(batch.kind) {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(2, &slot.placement_group, &[]);
+            last = Some(batch.kind);
+        }
         pass.set_bind_group(1, group, &[]);
-        pass.set_vertex_buffer(0, mesh.vertices.slice(..));
-        pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..mesh.count, 0, 0..1);
+        pass.set_vertex_buffer(0, batch.vertices.slice(..));
+        pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..batch.count, 0, instances.clone());
     }
 }
 

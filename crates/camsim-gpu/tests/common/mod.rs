@@ -139,7 +139,7 @@ pub fn render_with_ideal(sequence: &Arc<Sequence>, phase: f32) -> (Finished, Ide
 /// Boxes on level ground: `side` x `side` of them, 30 m apart, turned and of different size; textures are smooth pictures.
 pub fn city(side: u32) -> Scene {
     let mut scene = pattern(800.0);
-    let texture = scene.meshes[0].texture.clone();
+    let texture = scene.meshes[0].material.texture.clone();
     for i in 0..side * side {
         let [column, row] = [i % side, i / side].map(f64::from);
         // Any irregular numbers do.
@@ -159,23 +159,17 @@ fn tower(texture: &Arc<Texture>, centre_ned_m: DVec3, half_m: [f64; 2], height_m
         [(n * cos - e * sin) as f32, (n * sin + e * cos) as f32, down as f32]
     };
     let corners = [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]];
-    let mut mesh = Mesh {
-        vertices: Vec::new(),
-        indices: Vec::new(),
-        texture: texture.clone(),
-        origin_ned_m: centre_ned_m,
-        wrap: camsim_core::scene::Wrap::Clamp,
-    };
+    let mut shape = camsim_core::scene::Shape::default();
     let mut face = |positions: [[f32; 3]; 4], first_uv: f32| {
-        let base = mesh.vertices.len() as u32;
+        let base = shape.vertices.len() as u32;
         let uvs = [[0.0, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]].map(|[u, v]: [f32; 2]| [u + first_uv, v + 0.5 * first_uv]);
-        mesh.vertices.extend(positions.iter().zip(uvs).map(|(&position_m, uv)| camsim_core::scene::MeshVertex { position_m, uv }));
-        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i: u32| base + i));
+        shape.vertices.extend(positions.iter().zip(uvs).map(|(&position_m, uv)| camsim_core::scene::MeshVertex::new(position_m, uv)));
+        shape.indices.extend([0, 1, 2, 0, 2, 3].map(|i: u32| base + i));
     };
     for k in 0..4 {
         let ([a, b], [c, d]) = (corners[k], corners[(k + 1) % 4]);
         face([at(a, b, 0.0), at(c, d, 0.0), at(c, d, -height_m), at(a, b, -height_m)], 0.2 * k as f32);
     }
     face(corners.map(|[a, b]| at(a, b, -height_m)), 0.85);
-    mesh
+    Mesh::new(shape.vertices, shape.indices, texture.clone(), centre_ned_m, camsim_core::scene::Wrap::Clamp)
 }

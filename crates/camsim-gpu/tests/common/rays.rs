@@ -35,7 +35,7 @@ pub fn cast(scene: &Scene, origin: DVec3, direction: DVec3) -> (DVec3, usize) {
     }
     for (i, mesh) in scene.meshes.iter().enumerate() {
         if let Some((t, uv)) = mesh.intersect(origin, direction, best.0) {
-            best = (t, texel(&mesh.texture, uv), 10 + i);
+            best = (t, texel(&mesh.material.texture, uv), 10 + i);
         }
     }
     (best.1, best.2)
@@ -102,22 +102,18 @@ pub fn expected(sequence: &Sequence, plan: &FramePlan) -> Vec<(usize, DVec3)> {
 /// A level square above the ground, turned by 17 degrees.
 pub fn roof(height_m: f64, half_m: f64) -> Mesh {
     let (sin, cos) = 17_f64.to_radians().sin_cos();
-    let corner = |n: f64, e: f64| MeshVertex {
-        position_m: [((n * cos - e * sin) * half_m) as f32, ((n * sin + e * cos) * half_m) as f32, 0.0],
-        uv: [0.5, 0.5],
+    let corner = |n: f64, e: f64| {
+        let position_m = [((n * cos - e * sin) * half_m) as f32, ((n * sin + e * cos) * half_m) as f32, 0.0];
+        MeshVertex::new(position_m, [0.5, 0.5])
     };
-    Mesh {
-        vertices: vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)],
-        indices: vec![0, 1, 2, 0, 2, 3],
-        texture: Arc::new(Texture::uniform([255; 4], Encoding::Linear)),
-        origin_ned_m: DVec3::new(3.0, -2.0, -height_m),
-        wrap: Wrap::Clamp,
-    }
+    let vertices = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+    let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+    Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], texture, DVec3::new(3.0, -2.0, -height_m), Wrap::Clamp)
 }
 
 pub fn black_ground_and_roof() -> Scene {
     let mut scene = super::pattern(6000.0);
-    scene.meshes[0].texture = Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear));
+    scene.meshes[0].material.texture = Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear));
     scene.meshes.push(roof(60.0, 15.0));
     scene
 }

@@ -4,38 +4,38 @@ use serde_json::{Map, Value};
 
 /// A parsed file.
 #[derive(Debug)]
-pub(super) struct Document {
+pub(crate) struct Document {
     /// Name of the root element of an XML file; empty otherwise.
-    pub(super) root: String,
+    pub(crate) root: String,
     /// Its content. XML attributes are keys like elements.
-    pub(super) value: Value,
+    pub(crate) value: Value,
 }
 
 /// What is wrong with a key.
 #[derive(Debug)]
-pub(super) struct Problem {
+pub(crate) struct Problem {
     /// The key, with its path.
-    pub(super) key: String,
+    pub(crate) key: String,
     /// What is wrong and what to do.
-    pub(super) message: String,
+    pub(crate) message: String,
 }
 
 impl Problem {
-    pub(super) fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
+    pub(crate) fn new(key: impl Into<String>, message: impl Into<String>) -> Self {
         Self { key: key.into(), message: message.into() }
     }
 }
 
 /// What is wrong with a text.
 #[derive(Debug)]
-pub(super) struct SyntaxProblem {
-    pub(super) line: Option<usize>,
-    pub(super) message: String,
+pub(crate) struct SyntaxProblem {
+    pub(crate) line: Option<usize>,
+    pub(crate) message: String,
 }
 
 impl Document {
     /// Parses by the first character: `<` is XML, `{` JSON, anything else YAML.
-    pub(super) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
+    pub(crate) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
         match text.trim_start().chars().next() {
             Some('<') => Self::parse_xml(text),
             Some('{') => serde_json::from_str(text)
@@ -104,7 +104,7 @@ fn scalar(text: &str) -> Value {
 }
 
 /// The value at a path of keys `a.b`; null counts as absent. A repeated XML element counts by its last appearance.
-pub(super) fn find<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
+pub(crate) fn find<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
     let found = path.split('.').try_fold(value, |value, key| {
         let value = if let Value::Array(list) = value { list.last()? } else { value };
         value.get(key)
@@ -113,12 +113,12 @@ pub(super) fn find<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
 }
 
 /// A finite number.
-pub(super) fn number(value: &Value, path: &str) -> Result<f64, Problem> {
+pub(crate) fn number(value: &Value, path: &str) -> Result<f64, Problem> {
     optional_number(value, path)?.ok_or_else(|| Problem::new(path, "is missing"))
 }
 
 /// A finite number, or nothing.
-pub(super) fn optional_number(value: &Value, path: &str) -> Result<Option<f64>, Problem> {
+pub(crate) fn optional_number(value: &Value, path: &str) -> Result<Option<f64>, Problem> {
     match find(value, path) {
         None => Ok(None),
         Some(found) => as_number(found).map(Some).ok_or_else(|| Problem::new(path, format!("is {found}, not a finite number"))),
@@ -136,7 +136,7 @@ fn as_number(value: &Value) -> Option<f64> {
 }
 
 /// A list of finite numbers: a list, a matrix as list of rows, `{rows, cols, data}`, or (XML) text with blanks between.
-pub(super) fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, Problem> {
+pub(crate) fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, Problem> {
     let found = find(value, path).ok_or_else(|| Problem::new(path, "is missing"))?;
     let wrong = || Problem::new(path, "is not a list of finite numbers");
     let list = match found {
@@ -165,14 +165,14 @@ pub(super) fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, Problem> {
 }
 
 /// Exactly N finite numbers.
-pub(super) fn numbers_n<const N: usize>(value: &Value, path: &str) -> Result<[f64; N], Problem> {
+pub(crate) fn numbers_n<const N: usize>(value: &Value, path: &str) -> Result<[f64; N], Problem> {
     let list = numbers(value, path)?;
     let count = list.len();
     list.try_into().map_err(|_| Problem::new(path, format!("has {count} numbers instead of {N}")))
 }
 
 /// fx, fy and cx, cy of a 3x3 camera matrix.
-pub(super) fn camera_matrix(value: &Value, path: &str) -> Result<([f64; 2], [f64; 2]), Problem> {
+pub(crate) fn camera_matrix(value: &Value, path: &str) -> Result<([f64; 2], [f64; 2]), Problem> {
     let [fx, skew, cx, zero, fy, cy, ..] = numbers_n::<9>(value, path)?;
     if skew != 0.0 || zero != 0.0 {
         return Err(Problem::new(path, format!("has a skew of {skew}, which a camera here cannot have: recalibrate without skew")));
@@ -181,7 +181,7 @@ pub(super) fn camera_matrix(value: &Value, path: &str) -> Result<([f64; 2], [f64
 }
 
 /// Width and height out of two numbers.
-pub(super) fn size(key: &str, [width, height]: [f64; 2]) -> Result<[u32; 2], Problem> {
+pub(crate) fn size(key: &str, [width, height]: [f64; 2]) -> Result<[u32; 2], Problem> {
     let whole = |x: f64| (x.fract() == 0.0 && (1.0..=65_535.0).contains(&x)).then_some(x as u32);
     match (whole(width), whole(height)) {
         (Some(width), Some(height)) => Ok([width, height]),
@@ -190,12 +190,12 @@ pub(super) fn size(key: &str, [width, height]: [f64; 2]) -> Result<[u32; 2], Pro
 }
 
 /// A word.
-pub(super) fn word<'a>(value: &'a Value, path: &str) -> Option<&'a str> {
+pub(crate) fn word<'a>(value: &'a Value, path: &str) -> Option<&'a str> {
     find(value, path).and_then(Value::as_str).map(str::trim)
 }
 
 /// Refuses coefficients beyond what the Brown-Conrady model has, unless they are zero.
-pub(super) fn at_most(key: &str, mut coefficients: Vec<f64>, max: usize, what: &str) -> Result<Vec<f64>, Problem> {
+pub(crate) fn at_most(key: &str, mut coefficients: Vec<f64>, max: usize, what: &str) -> Result<Vec<f64>, Problem> {
     if coefficients.iter().skip(max).any(|k| *k != 0.0) {
         return Err(Problem::new(
             key,

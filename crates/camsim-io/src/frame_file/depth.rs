@@ -84,6 +84,31 @@ fn usable(depth_m: f64) -> bool {
     depth_m.is_finite() && depth_m > NEAREST_M
 }
 
+/// Gives each pixel without depth that of the nearest one with, counted in steps to the four neighbours; of several at one distance the farthest
+/// surface, since what hides from a depth camera is behind what it sees. Without any depth nothing changes.
+pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
+    let (width, height) = (width as usize, height as usize);
+    let mut front: Vec<usize> = (0..inverse_depth.len()).filter(|&i| inverse_depth[i] > 0.0).collect();
+    while !front.is_empty() {
+        let mut found: Vec<(usize, f32)> = Vec::new();
+        for &i in &front {
+            let (x, y) = (i % width, i / width);
+            let neighbours = [
+                (x > 0).then(|| i - 1),
+                (x + 1 < width).then_some(i + 1),
+                (y > 0).then(|| i - width),
+                (y + 1 < height).then_some(i + width),
+            ];
+            found.extend(neighbours.into_iter().flatten().filter(|&at| inverse_depth[at] == 0.0).map(|at| (at, inverse_depth[i])));
+        }
+        // Of a pixel that is found several times the smallest inverse depth stays.
+        found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        found.dedup_by_key(|(at, _)| *at);
+        found.iter().for_each(|&(at, inverse)| inverse_depth[at] = inverse);
+        front = found.into_iter().map(|(at, _)| at).collect();
+    }
+}
+
 /// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is in another sign or unit.
 fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(), FrameFileError> {
     if values.iter().any(|value| usable(value / per_metre)) {
@@ -132,4 +157,22 @@ fn packed24(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileEr
     let depth_m = |[r, g, b]: [u8; 3]| f64::from(r) * 255.0 + f64::from(g) + f64::from(b) / 255.0;
     let metres = picture.to_rgb8().pixels().map(|pixel| depth_m(pixel.0)).collect::<Vec<_>>();
     Ok(metres.into_iter().map(|z| if z >= PACKED24_SKY_M { 0.0 } else { z }).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holes_take_the_nearest_and_of_two_the_farther() {
+        let mut depth = [1.0, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0];
+        fill_holes(&mut depth, [5, 2]);
+        assert_eq!(depth, [1.0, 1.0, 0.25, 0.25, 0.25, 1.0, 1.0, 0.25, 0.25, 0.25]);
+        let mut none = [0.0; 6];
+        fill_holes(&mut none, [3, 2]);
+        assert_eq!(none, [0.0; 6]);
+        let mut whole = [0.5; 6];
+        fill_holes(&mut whole, [2, 3]);
+        assert_eq!(whole, [0.5; 6]);
+    }
 }

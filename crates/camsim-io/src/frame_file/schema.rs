@@ -10,6 +10,7 @@ pub(super) const FRAME: Schema = Schema {
         ("depth_encoding", Word(&["plain", "packed24"])),
         ("depth_per_metre", Number),
         ("depth_kind", Word(&["planar", "range"])),
+        ("holes", Word(&["far", "nearest"])),
         ("focal_px", Numbers(2)),
         ("principal_point_px", Numbers(2)),
         ("instant_ms", Number),

@@ -86,6 +86,7 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         }
         Kind::CountOr(most, words) => (count(value) || among(value, words), format!("a whole number up to {most} or {}", list(words))),
         Kind::Numbers(n) => (all(value, Some(n), &number), format!("a list of {n} numbers")),
+        Kind::Flag => (value.is_bool(), "true or false".to_owned()),
         Kind::NumbersOr(n, word) => (all(value, Some(n), &number) || among(value, &[word]), format!("a list of {n} numbers or \"{word}\"")),
         Kind::Counts(n, most) => (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {most}")),
         Kind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),

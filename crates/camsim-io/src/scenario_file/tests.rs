@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use camsim_core::scenario::{Auto, CameraSpec, FieldOr, OutputSpec, QualitySpec, Readout, TrackerSpec};
+use camsim_core::scenario::{Auto, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, OutputSpec, QualitySpec, Readout, TrackerSpec};
 
 use super::{schema::KEYS, *};
 
@@ -30,7 +30,7 @@ fn the_printed_default_holds_the_defaults() {
 #[test]
 fn every_word_of_the_schema_is_known_to_the_structs() {
     for (key, kind) in KEYS {
-        if key.starts_with("camera.mount.vibration.") || key.starts_with("camera.zoom.") {
+        if ["camera.mount.vibration.", "camera.zoom.", "scene.board.", "scene.gltf."].iter().any(|table| key.starts_with(table)) {
             continue;
         }
         let values: Vec<String> = match kind {
@@ -55,20 +55,63 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
 #[test]
 fn every_key_of_the_structs_is_in_the_schema() {
     let mut text = print_default();
-    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "fog_visibility_m"] {
+    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "gltf", "fog_visibility_m"] {
         text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
     }
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
     text += "[[camera.mount.vibration]]\naxis = \"roll\"\nhz = 3\n";
     let mut scenario = parse(&text).unwrap();
     scenario.scene.terrain.as_mut().unwrap().epsg = Some(32632);
+    assert_eq!(scenario.scene.board, Some(BoardSpec { kind: Some(BoardKind::Chessboard), ..board(9, 6, 0.05) }));
     let saved = toml::to_string(&scenario).unwrap();
     assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario, "a saved scenario reads back");
+    scenario.scene.board = Some(BoardSpec {
+        target: Some("target.yaml".into()),
+        kind: Some(BoardKind::Charuco),
+        row_size_m: Some(1.0),
+        diameter_m: Some(1.0),
+        spacing: Some(1.0),
+        marker_m: Some(1.0),
+        dictionary: Some(Dictionary::SixBySix),
+        first_id: Some(1),
+        margin_m: Some(1.0),
+        geodetic: Some([47.0, 8.0, 400.0]),
+        ..board(1, 1, 1.0)
+    });
+    let model = &mut scenario.scene.gltf[0];
+    (model.placements, model.geodetic) = (Some("a.csv".into()), Some([47.0, 8.0, 400.0]));
+    (model.scene, model.time_s, model.animation) = (Some(1), Some(2.0), Some(3));
+    let saved = toml::to_string(&scenario).unwrap();
     let mut seen = Vec::new();
     collect(&toml::from_str(&saved).unwrap(), "", &mut seen);
     for (key, kind) in KEYS {
         let later = matches!(kind, schema::Kind::Later);
         assert_eq!(seen.iter().any(|s| s == key), !later, "{key} stands in the schema but not in the struct, or the other way round");
+    }
+}
+
+fn board(columns: u32, rows: u32, size_m: f64) -> BoardSpec {
+    let count = (Some(columns), Some(rows));
+    BoardSpec { columns: count.0, rows: count.1, size_m: Some(size_m), angles_deg: [0.0, 90.0, 0.0], ..BoardSpec::default() }
+}
+
+#[test]
+fn boards_are_read_by_their_keys() {
+    let text = |keys: &str| format!("[flight]\nlog = \"a.csv\"\n[scene.board]\n{keys}\n");
+    for kind in ["chessboard", "circles", "asymmetric-circles", "aprilgrid", "charuco"] {
+        parse(&text(&format!("kind = \"{kind}\"\ncolumns = 5\nrows = 4\nsize_m = 0.1"))).unwrap();
+    }
+    for word in ["4x4", "5x5", "6x6"] {
+        parse(&text(&format!("kind = \"charuco\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\ndictionary = \"{word}\""))).unwrap();
+    }
+    for (keys, wanted) in [
+        ("kind = \"chesboard\"", "did you mean \"chessboard\"?"),
+        ("kind = \"charuco\"\ncolumns = 5\nrows = 4", "scene.board.size_m: is missing"),
+        ("kind = \"circles\"\ncolumns = 5\nrows = 4\nsize_m = 0.1\nmarker_m = 0.1", "s.toml:8: scene.board.marker_m: does not belong"),
+        ("kind = \"circles\"\ncolumns = 500\nrows = 4\nsize_m = 0.1", "1 to 80"),
+    ] {
+        let error = parse(&text(keys)).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
     }
 }
 

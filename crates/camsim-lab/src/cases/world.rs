@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, TerrainError, Texture, Wrap},
+    scene::{Encoding, Mesh, MeshVertex, Scene, Shape, Terrain, TerrainError, Texture, Wrap},
     sequence::GrayImage,
 };
 use glam::DVec3;
@@ -48,8 +48,8 @@ impl World {
     pub fn plane(&self) -> Scene {
         const COPIES: f64 = 8.0;
         let mut ground = Mesh::level_picture(self.ground.clone(), DVec3::ZERO, COPIES * GROUND_M);
-        ground.wrap = Wrap::Repeat;
-        for vertex in &mut ground.vertices {
+        ground.material.wrap = [Wrap::Repeat; 2];
+        for vertex in &mut Arc::make_mut(&mut ground.shape).vertices {
             vertex.uv = vertex.uv.map(|t| t * COPIES as f32);
         }
         Scene { meshes: vec![ground], sky_linear: [0.35, 0.55, 0.9], ..Scene::default() }
@@ -93,8 +93,7 @@ impl World {
     /// of the ground at (north, east).
     fn houses(&self, half_m: f64, sunk_m: f64, ground_m: &dyn Fn(f64, f64) -> f64) -> Mesh {
         const PLOT_M: f64 = 40.0;
-        let mut mesh =
-            Mesh { vertices: Vec::new(), indices: Vec::new(), texture: self.facade.clone(), origin_ned_m: DVec3::ZERO, wrap: Wrap::Repeat };
+        let mut shape = Shape::default();
         let plots = (half_m / PLOT_M).floor() as i32;
         for (i, j) in (-plots..=plots).flat_map(|i| (-plots..=plots).map(move |j| (i, j))) {
             let random = |k: u64| unit(hash((i + 1000) as u64 * 4096 + (j + 1000) as u64, k));
@@ -102,14 +101,14 @@ impl World {
             let half = [4.0 + 4.0 * random(2), 4.0 + 4.0 * random(3)];
             let ground_m = ground_m(centre[0], centre[1]);
             let heights_m = [ground_m - sunk_m, ground_m + 6.0 + 14.0 * random(4)];
-            push_box(&mut mesh, centre, half, random(5) * std::f64::consts::PI, heights_m);
+            push_box(&mut shape, centre, half, random(5) * std::f64::consts::PI, heights_m);
         }
-        mesh
+        Mesh::new(shape.vertices, shape.indices, self.facade.clone(), DVec3::ZERO, Wrap::Repeat)
     }
 }
 
 /// Four walls and a roof from `heights_m[0]` to `heights_m[1]`.
-fn push_box(mesh: &mut Mesh, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f64, heights_m: [f64; 2]) {
+fn push_box(shape: &mut Shape, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f64, heights_m: [f64; 2]) {
     let (sin, cos) = turn_rad.sin_cos();
     let corner = |a: f64, b: f64| {
         let (x, y) = (a * half_m[0], b * half_m[1]);
@@ -118,13 +117,13 @@ fn push_box(mesh: &mut Mesh, centre_m: [f64; 2], half_m: [f64; 2], turn_rad: f64
     let corners = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
     let [bottom_m, top_m] = heights_m;
     let mut face = |points: [[f64; 3]; 4], size_m: [f64; 2]| {
-        let first = mesh.vertices.len() as u32;
+        let first = shape.vertices.len() as u32;
         for (point, [a, b]) in points.into_iter().zip([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]) {
             // Each house has its own part of the picture.
             let uv = [a * size_m[0] + centre_m[0], b * size_m[1] + centre_m[1]].map(|m| (m / FACADE_M) as f32);
-            mesh.vertices.push(MeshVertex { position_m: point.map(|m| m as f32), uv });
+            shape.vertices.push(MeshVertex::new(point.map(|m| m as f32), uv));
         }
-        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
+        shape.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
     };
     let at = |[n, e]: [f64; 2], height_m: f64| [n, e, -height_m];
     face(corners.map(|c| at(c, top_m)), [2.0 * half_m[1], 2.0 * half_m[0]]);
@@ -228,9 +227,9 @@ mod tests {
         let world = World::new(5);
         let scene = world.town_on_hills(120.0, 10.0).expect("a terrain");
         let (terrain, houses) = (scene.terrain.expect("hills"), &scene.meshes[0]);
-        assert_eq!(houses.indices.len() % 30, 0);
+        assert_eq!(houses.shape.indices.len() % 30, 0);
         let mut above = 0;
-        for corners in houses.vertices.chunks_exact(20) {
+        for corners in houses.shape.vertices.chunks_exact(20) {
             // The roof comes first.
             let roof = DVec3::from_array(corners[0].position_m.map(f64::from));
             let from = DVec3::new(roof.x, roof.y, -500.0);
@@ -238,6 +237,6 @@ mod tests {
             above += u32::from(roof.z < ground);
             assert!(corners.iter().any(|c| f64::from(c.position_m[2]) > ground), "the walls reach the ground");
         }
-        assert_eq!(above as usize, houses.vertices.len() / 20, "every roof is above ground");
+        assert_eq!(above as usize, houses.shape.vertices.len() / 20, "every roof is above ground");
     }
 }

@@ -1,6 +1,6 @@
 //! Boxes, and a quadtree of boxes over the grid.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// A box along the NED axes, metres. Empty if any `min` is above its `max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +34,17 @@ impl Aabb {
     /// Middle of the box.
     pub fn centre(&self) -> DVec3 {
         0.5 * (self.min + self.max)
+    }
+
+    /// Smallest box around this one, turned and scaled about (0, 0, 0) and then moved.
+    pub(crate) fn turned(&self, turn: DMat3, shift: DVec3) -> Self {
+        if self.is_empty() {
+            return *self;
+        }
+        let half = 0.5 * (self.max - self.min);
+        let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        let centre = turn * self.centre() + shift;
+        Self { min: centre - reach, max: centre + reach }
     }
 
     /// Distance from a point to the nearest point of the box, 0 inside; infinite for an empty box.

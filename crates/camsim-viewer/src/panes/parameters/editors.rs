@@ -30,6 +30,7 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Par
         Kind::NumbersOr(count, word) => numbers_or(ui, key, value, param, count, word, out),
         Kind::NumberList => list(ui, key, value, param, out),
         Kind::Path => path(ui, key, value),
+        Kind::Flag => flag(ui, key, value),
         Kind::Word(words) => word(ui, key, value, words),
         Kind::Words(words) => several(ui, key, value, words),
         Kind::Tables | Kind::Later => None,
@@ -194,6 +195,13 @@ fn path(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
         return None;
     }
     Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), ongoing: false })
+}
+
+fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
+    let mut on = value.and_then(Value::as_bool).unwrap_or_default();
+    let response = ui.checkbox(&mut on, "");
+    named(&response, Role::CheckBox, key);
+    response.changed().then_some(Value::Boolean(on)).and_then(once)
 }
 
 fn word(ui: &mut Ui, key: &str, value: Option<&Value>, words: &[&str]) -> Option<Edit> {

@@ -1,0 +1,80 @@
+//! `camsim board`: a calibration board's picture, to print, and the points on it.
+
+use std::path::PathBuf;
+
+use anyhow::anyhow;
+use camsim_core::{
+    frame::RenderedFrame,
+    scenario::{BoardSpec, OutputEncoding},
+    scene::{Board, ned_from_board},
+};
+use camsim_io::{
+    board_file::read_board,
+    load::{board_place, load_flight},
+    scenario_file::read_scenario,
+    write::write_picture,
+};
+
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    output::{check_output, write_output},
+};
+
+/// Write a calibration board's picture and the places of its corners or circles
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  camsim board flight.toml -o board.png --points points.csv
+  camsim board april_6x6.yaml -o board.png")]
+pub struct Args {
+    /// Scenario with a [scene.board], or Kalibr's target YAML
+    board: PathBuf,
+    /// Picture: .png or linear .exr
+    #[arg(short, long, value_name = "PICTURE")]
+    output: Option<PathBuf>,
+    /// Points as id,x_m,y_m from the board's middle, x right and y down; of a scenario also n_m,e_m,d_m. Standard output if there is no
+    /// picture either
+    #[arg(long, value_name = "CSV")]
+    points: Option<PathBuf>,
+}
+
+/// Runs `camsim board`.
+pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
+    args.output.as_deref().map_or(Ok(()), check_output)?;
+    let yaml = args.board.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("yaml") || ending.eq_ignore_ascii_case("yml"));
+    let (board, place) = if yaml {
+        (read_board(&BoardSpec { target: Some(args.board.clone()), ..BoardSpec::default() }).or_bad_input()?, None)
+    } else {
+        let scenario = read_scenario(&args.board, &[], None).or_bad_input()?;
+        let spec = scenario.scene.board.as_ref();
+        let spec = spec.ok_or_else(|| anyhow!("{}: has no [scene.board]", args.board.display())).or_bad_input()?;
+        let (log, _) = load_flight(&scenario).or_bad_input()?;
+        let centre_ned_m = board_place(&scenario, spec, &log).or_bad_input()?;
+        (read_board(spec).or_bad_input()?, Some((centre_ned_m, ned_from_board(spec.angles_deg))))
+    };
+    if let Some(path) = &args.output {
+        write_picture(path, &picture(&board), OutputEncoding::Luma8).or_failed()?;
+    }
+    if args.points.is_none() && args.output.is_some() {
+        return Ok(());
+    }
+    write_output(args.points.as_deref(), console, |out| {
+        writeln!(out, "id,x_m,y_m{}", if place.is_some() { ",n_m,e_m,d_m" } else { "" })?;
+        for point in board.points() {
+            write!(out, "{},{:?},{:?}", point.id, point.at_m.x, point.at_m.y)?;
+            if let Some((centre_ned_m, turn)) = place {
+                let ned = centre_ned_m + turn * point.at_m.extend(0.0);
+                write!(out, ",{:?},{:?},{:?}", ned.x, ned.y, ned.z)?;
+            }
+            writeln!(out)?;
+        }
+        Ok(())
+    })
+}
+
+fn picture(board: &Board) -> RenderedFrame {
+    let texture = board.picture();
+    let color_rgba = texture.rgba8.iter().map(|&byte| f32::from(byte) / 255.0).collect();
+    RenderedFrame { index: 0, stamp_ns: 0, size_px: texture.size_px, color_rgba, depth_m: None, coords: None, rows: Vec::new() }
+}

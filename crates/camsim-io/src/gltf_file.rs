@@ -1,0 +1,225 @@
+//! glTF 2.0 models: the triangles of one of a file's scenes, posed at one of its times.
+//!
+//! A model's own axes are glTF's: x left, y up, z ahead, metres. [`Model::place`] stands it in north-east-down. Colour is albedo: base colour
+//! times vertex colour, plus what is emitted; light and shade are none. What cannot be shown is refused, with its name, or noted.
+
+use std::{
+    collections::{HashMap, HashSet},
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use camsim_core::scene::{Material, Mesh, Shape};
+use glam::{DAffine3, DMat3, DVec3};
+
+mod accessor;
+mod material;
+mod pose;
+mod primitive;
+mod source;
+
+use material::Materials;
+use pose::Pose;
+use source::Source;
+
+/// Why a model cannot be shown.
+#[derive(Debug, thiserror::Error)]
+pub enum GltfError {
+    /// The file, or one that it names, cannot be read.
+    #[error("{}: cannot be read: {source}; check the path", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Not glTF 2.0, or damaged.
+    #[error("{}: {message}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, and where.
+        message: String,
+    },
+    /// Needs an extension that is not there.
+    #[error("{}: needs the extension {extension}, which is not supported: {fix}", path.display())]
+    Extension {
+        /// The file.
+        path: PathBuf,
+        /// Its name.
+        extension: String,
+        /// What to do.
+        fix: &'static str,
+    },
+}
+
+/// Which of a file's scenes, and when.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GltfOptions {
+    /// Number of the scene; the file's own choice if left out.
+    pub scene: Option<usize>,
+    /// Seconds within the animations; as the file's nodes stand if left out. Before the first key and after the last one nothing moves.
+    pub time_s: Option<f64>,
+    /// Number of the animation; all of them together if left out.
+    pub animation: Option<usize>,
+}
+
+/// A model's surfaces.
+#[derive(Clone, Debug, Default)]
+pub struct Model {
+    parts: Vec<Part>,
+    /// What of the file is not shown, or not as it is meant.
+    pub notes: Vec<String>,
+}
+
+#[derive(Clone, Debug)]
+struct Part {
+    shape: Arc<Shape>,
+    material: Material,
+    model_from_shape: DAffine3,
+}
+
+/// From a model's axes (x left, y up, z ahead) to forward, right, down.
+const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
+
+/// Parts of a scene, at most: a slip in a number must not fill the memory.
+const MOST_PARTS: usize = 1 << 20;
+/// Nodes within nodes, at most.
+const DEEPEST: usize = 1024;
+
+impl Model {
+    /// Meshes for a model whose origin is at `at_ned_m` and whose z looks `heading_rad` east of north.
+    pub fn place(&self, at_ned_m: DVec3, heading_rad: f64, scale: f64) -> impl Iterator<Item = Mesh> {
+        let ned_from_model = DMat3::from_rotation_z(heading_rad) * BODY_FROM_MODEL * scale;
+        self.parts.iter().map(move |part| Mesh {
+            shape: part.shape.clone(),
+            material: part.material.clone(),
+            origin_ned_m: at_ned_m + ned_from_model * part.model_from_shape.translation,
+            ned_from_shape: ned_from_model * part.model_from_shape.matrix3,
+        })
+    }
+
+    /// Triangles of one placed model.
+    #[must_use]
+    pub fn triangles(&self) -> usize {
+        self.parts.iter().map(|part| part.shape.indices.len() / 3).sum()
+    }
+}
+
+/// Reads a `.gltf` or `.glb` file.
+///
+/// # Errors
+/// [`GltfError`] names the file, or the extension that it would need.
+pub fn read_gltf(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
+    // The glTF crate takes some of what a damaged file says for granted. Nothing outlives the call that it could leave half done.
+    let damaged = |_| Err(GltfError::Broken { path: path.into(), message: "is damaged".into() });
+    std::panic::catch_unwind(|| read(path, options)).unwrap_or_else(damaged)
+}
+
+fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
+    let source = Source::read(path)?;
+    let broken = |message: String| GltfError::Broken { path: path.into(), message };
+    let document = &source.document;
+    let Some(scene) = options.scene.map_or_else(|| document.default_scene().or(document.scenes().next()), |n| document.scenes().nth(n))
+    else {
+        return match options.scene {
+            Some(n) => Err(broken(format!("has no scene {n}; the last one is {}", document.scenes().count() as i64 - 1))),
+            None => Ok(Model { parts: Vec::new(), notes: vec!["has no scene: nothing of it is shown".into()] }),
+        };
+    };
+    let mut reader = Reader {
+        pose: Pose::new(&source, options)?,
+        materials: Materials::new(&source),
+        source: &source,
+        shapes: HashMap::new(),
+        parts: Vec::new(),
+        met: HashSet::new(),
+        notes: Vec::new(),
+    };
+    for node in scene.nodes() {
+        reader.node(&node, DAffine3::IDENTITY, 0)?;
+    }
+    let Reader { parts, mut notes, materials, .. } = reader;
+    if parts.is_empty() {
+        notes.push("has no triangles: nothing of it is shown".into());
+    }
+    notes.extend(materials.notes);
+    notes.sort();
+    notes.dedup();
+    Ok(Model { parts, notes })
+}
+
+struct Reader<'a> {
+    source: &'a Source,
+    pose: Pose,
+    materials: Materials<'a>,
+    /// By mesh, primitive and whether it is mirrored: those that no node changes.
+    shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
+    parts: Vec<Part>,
+    /// Nodes that have been met: a tree comes by each of them once.
+    met: HashSet<usize>,
+    notes: Vec<String>,
+}
+
+impl Reader<'_> {
+    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, depth: usize) -> Result<(), GltfError> {
+        if depth > DEEPEST {
+            return Err(self.source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
+        }
+        if !self.met.insert(node.index()) {
+            return Err(self.source.broken(format!("nodes.{}: has two parents", node.index())));
+        }
+        let model_from_node = model_from_parent * self.pose.parent_from_node(node);
+        if let Some(mesh) = node.mesh() {
+            let instances = self.source.instances(node.index())?;
+            for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
+                self.mesh(node, &mesh, model_from_node * node_from_instance)?;
+            }
+        }
+        node.children().try_for_each(|child| self.node(&child, model_from_node, depth + 1))
+    }
+
+    fn mesh(&mut self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, model_from_node: DAffine3) -> Result<(), GltfError> {
+        for primitive in mesh.primitives() {
+            if self.parts.len() >= MOST_PARTS {
+                return Err(self.source.broken(format!("has more than {MOST_PARTS} parts")));
+            }
+            let Some(triangles) = primitive::triangle_mode(primitive.mode()) else {
+                self.notes.push("points and lines are not shown".into());
+                continue;
+            };
+            let weights = self.pose.weights(node, mesh);
+            let joints = node.skin().map(|skin| self.pose.joints(self.source, &skin)).transpose()?;
+            // What a skin moves stands in the model's axes.
+            let model_from_shape = if joints.is_some() { DAffine3::IDENTITY } else { model_from_node };
+            let mirrored = model_from_shape.matrix3.determinant() < 0.0;
+            let own = joints.is_some() || primitive.morph_targets().next().is_some();
+            let key = (mesh.index(), primitive.index(), mirrored);
+            let (material, uv) = self.materials.of(&primitive.material())?;
+            let shape = match self.shapes.get(&key).filter(|_| !own) {
+                Some(shape) => shape.clone(),
+                None => {
+                    let made = primitive::Making {
+                        source: self.source,
+                        triangles,
+                        mirrored,
+                        uv: &uv,
+                        weights: &weights,
+                        joints: joints.as_deref(),
+                    };
+                    Arc::new(made.shape(&primitive)?)
+                }
+            };
+            if !own {
+                self.shapes.insert(key, shape.clone());
+            }
+            if !shape.indices.is_empty() {
+                self.parts.push(Part { shape, material, model_from_shape });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,140 @@
+//! Materials: base colour, what is emitted, holes, sides; and how texture coordinates reach the picture.
+
+use std::{collections::HashMap, sync::Arc};
+
+use camsim_core::scene::{Encoding, Material, Texture, Wrap};
+use gltf::{
+    material::AlphaMode,
+    texture::{Info, MagFilter, WrappingMode},
+};
+
+use super::{GltfError, source::Source};
+
+/// Where blended surfaces are cut, as blending is not there.
+const BLEND_CUTOFF: f32 = 0.5;
+
+/// How a primitive's corners meet its picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct UvRule {
+    /// Which set of texture coordinates.
+    pub set: u32,
+    /// `KHR_texture_transform`: offset, rotation in radians, scale.
+    pub offset: [f64; 2],
+    pub rotation: f64,
+    pub scale: [f64; 2],
+    /// Factor of every corner's colour.
+    pub factor: [f32; 4],
+    /// Whether vertex colours count: of what is emitted they do not.
+    pub vertex_colors: bool,
+}
+
+/// A file's materials and pictures, each read once.
+#[derive(Debug)]
+pub(super) struct Materials<'a> {
+    source: &'a Source,
+    white: Arc<Texture>,
+    /// By image, and whether its alpha counts.
+    textures: HashMap<(usize, bool), Arc<Texture>>,
+    known: HashMap<Option<usize>, (Material, UvRule)>,
+    pub notes: Vec<String>,
+}
+
+impl<'a> Materials<'a> {
+    pub fn new(source: &'a Source) -> Self {
+        let white = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+        Self { source, white, textures: HashMap::new(), known: HashMap::new(), notes: Vec::new() }
+    }
+
+    pub fn of(&mut self, material: &gltf::Material<'_>) -> Result<(Material, UvRule), GltfError> {
+        if let Some(known) = self.known.get(&material.index()) {
+            return Ok(known.clone());
+        }
+        let base = material.pbr_metallic_roughness();
+        let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
+        let emits = emitted.iter().any(|&part| part > 0.0);
+        let black = factor[..3].iter().all(|&part| part == 0.0);
+        let mut rule = UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true };
+        let mut emissive = [0.0; 3];
+        let info = match (base.base_color_texture(), material.emissive_texture()) {
+            // Nothing but what is emitted.
+            (_, Some(info)) if emits && black => {
+                rule.factor = [emitted[0], emitted[1], emitted[2], 1.0];
+                rule.vertex_colors = false;
+                Some(info)
+            }
+            (info, emissive_texture) => {
+                if emits {
+                    emissive = emitted;
+                    if emissive_texture.is_some() {
+                        emissive = [0.0; 3];
+                        self.notes.push("a picture of emitted light on top of a base colour is left out".into());
+                    }
+                }
+                info
+            }
+        };
+        let (texture, wrap, nearest) = match &info {
+            None => (self.white.clone(), [Wrap::Repeat; 2], false),
+            Some(info) => self.textured(info, material.alpha_mode() != AlphaMode::Opaque, &mut rule)?,
+        };
+        let cutoff = match material.alpha_mode() {
+            AlphaMode::Opaque => None,
+            AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
+            AlphaMode::Blend => {
+                self.notes.push("blended surfaces are shown where their alpha is 0.5 or more, and not mixed with what is behind".into());
+                Some(BLEND_CUTOFF)
+            }
+        };
+        let made = Material { texture, wrap, nearest, emissive, cutoff, one_sided: !material.double_sided() };
+        self.known.insert(material.index(), (made.clone(), rule));
+        Ok((made, rule))
+    }
+
+    fn textured(&mut self, info: &Info<'_>, has_alpha: bool, rule: &mut UvRule) -> Result<(Arc<Texture>, [Wrap; 2], bool), GltfError> {
+        rule.set = info.tex_coord();
+        if let Some(transform) = info.texture_transform() {
+            rule.set = transform.tex_coord().unwrap_or(rule.set);
+            rule.offset = transform.offset().map(f64::from);
+            rule.rotation = f64::from(transform.rotation());
+            rule.scale = transform.scale().map(f64::from);
+        }
+        let sampler = info.texture().sampler();
+        let wrap = |mode| match mode {
+            WrappingMode::ClampToEdge => Wrap::Clamp,
+            WrappingMode::MirroredRepeat => Wrap::Mirror,
+            WrappingMode::Repeat => Wrap::Repeat,
+        };
+        let texture = self.texture(&info.texture().source(), has_alpha)?;
+        Ok((texture, [wrap(sampler.wrap_s()), wrap(sampler.wrap_t())], sampler.mag_filter() == Some(MagFilter::Nearest)))
+    }
+
+    fn texture(&mut self, image: &gltf::Image<'_>, has_alpha: bool) -> Result<Arc<Texture>, GltfError> {
+        let key = (image.index(), has_alpha);
+        if let Some(texture) = self.textures.get(&key) {
+            return Ok(texture.clone());
+        }
+        let bytes = self.source.image(image)?;
+        let wrong = |reason: String| self.source.broken(format!("images.{}: cannot be decoded: {reason}", image.index()));
+        let decoded = crate::pictures::decode_bytes(&bytes).map_err(wrong)?;
+        let size_px = [decoded.width(), decoded.height()];
+        let mut texture = Texture { size_px, rgba8: decoded.into_rgba8().into_raw(), encoding: Encoding::Srgb };
+        if has_alpha {
+            texture.bleed_into_transparent();
+        } else {
+            // What does not count must not weigh colours either.
+            texture.rgba8.chunks_exact_mut(4).for_each(|pixel| pixel[3] = 255);
+        }
+        let texture = Arc::new(texture);
+        self.textures.insert(key, texture.clone());
+        Ok(texture)
+    }
+}
+
+impl UvRule {
+    /// Texture coordinates of the picture.
+    pub fn apply(&self, [u, v]: [f64; 2]) -> [f32; 2] {
+        let (sin, cos) = self.rotation.sin_cos();
+        let (u, v) = (u * self.scale[0], v * self.scale[1]);
+        [self.offset[0] + cos * u + sin * v, self.offset[1] - sin * u + cos * v].map(|x| x as f32)
+    }
+}

@@ -1,0 +1,138 @@
+//! A primitive's triangles, with morph targets and skin applied.
+
+use camsim_core::scene::{MeshVertex, Shape};
+use glam::{DAffine3, DVec3};
+use gltf::{Semantic, mesh::Mode};
+
+use super::{GltfError, accessor, material::UvRule, source::Source};
+
+/// How indices make triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Triangles {
+    List,
+    Strip,
+    Fan,
+}
+
+/// `None` for points and lines.
+pub(super) fn triangle_mode(mode: Mode) -> Option<Triangles> {
+    match mode {
+        Mode::Triangles => Some(Triangles::List),
+        Mode::TriangleStrip => Some(Triangles::Strip),
+        Mode::TriangleFan => Some(Triangles::Fan),
+        _ => None,
+    }
+}
+
+/// What a primitive becomes a shape by.
+pub(super) struct Making<'a> {
+    pub source: &'a Source,
+    pub triangles: Triangles,
+    /// Whether what it is placed by turns it inside out: its triangles are turned back.
+    pub mirrored: bool,
+    pub uv: &'a UvRule,
+    /// Of morph targets.
+    pub weights: &'a [f64],
+    /// From the bound shape to the model, by joint.
+    pub joints: Option<&'a [DAffine3]>,
+}
+
+impl Making<'_> {
+    pub fn shape(&self, primitive: &gltf::Primitive<'_>) -> Result<Shape, GltfError> {
+        let positions = self.positions(primitive)?;
+        let count = positions.len();
+        let of = |semantic: &Semantic| -> Result<Option<Vec<[f64; 4]>>, GltfError> {
+            let Some(accessor) = primitive.get(semantic) else { return Ok(None) };
+            let rows = accessor::rows(self.source, &accessor)?;
+            if rows.len() == count {
+                Ok(Some(rows))
+            } else {
+                Err(self.wrong(primitive, "its attributes have different numbers of elements"))
+            }
+        };
+        let uvs = of(&Semantic::TexCoords(self.uv.set))?;
+        let colors = if self.uv.vertex_colors { of(&Semantic::Colors(0))? } else { None };
+        let with_alpha =
+            primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == gltf::accessor::Dimensions::Vec4);
+        let vertex = |(i, position): (usize, &DVec3)| {
+            let [u, v] = uvs.as_ref().map_or([0.0; 2], |rows| [rows[i][0], rows[i][1]]);
+            let [r, g, b, a] = colors.as_ref().map_or([1.0; 4], |rows| rows[i]);
+            let color = [r, g, b, if with_alpha { a } else { 1.0 }];
+            let tint = std::array::from_fn(|k| (color[k] as f32 * self.uv.factor[k]).clamp(0.0, 1.0));
+            MeshVertex { position_m: position.as_vec3().to_array(), uv: self.uv.apply([u, v]), tint }
+        };
+        let vertices: Vec<MeshVertex> = positions.iter().enumerate().map(vertex).collect();
+        if vertices.iter().any(|vertex| !vertex.position_m.iter().chain(&vertex.uv).chain(&vertex.tint).all(|part| part.is_finite())) {
+            return Err(self.wrong(primitive, "a position, texture coordinate or colour is not a finite number"));
+        }
+        Ok(Shape { vertices, indices: self.indices(primitive, count)? })
+    }
+
+    fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
+        self.source.broken(format!("a mesh's primitive {}: {message}", primitive.index()))
+    }
+
+    fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
+        let Some(accessor) = primitive.get(&Semantic::Positions) else { return Ok(Vec::new()) };
+        let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
+        let mut positions: Vec<DVec3> = accessor::rows(self.source, &accessor)?.into_iter().map(vector).collect();
+        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
+            let Some(accessor) = target.positions() else { continue };
+            let shifts = accessor::rows(self.source, &accessor)?;
+            if shifts.len() != positions.len() {
+                return Err(self.wrong(primitive, "a morph target has another number of elements"));
+            }
+            positions.iter_mut().zip(shifts).for_each(|(position, shift)| *position += weight * vector(shift));
+        }
+        if let Some(joints) = self.joints {
+            self.bend(primitive, joints, &mut positions)?;
+        }
+        Ok(positions)
+    }
+
+    /// Each corner goes with up to four joints of each set.
+    fn bend(&self, primitive: &gltf::Primitive<'_>, joints: &[DAffine3], positions: &mut [DVec3]) -> Result<(), GltfError> {
+        let mut bent = vec![(DVec3::ZERO, 0.0); positions.len()];
+        for set in 0.. {
+            let (Some(of), Some(by)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else { break };
+            let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
+            if of.len() != positions.len() || by.len() != positions.len() {
+                return Err(self.wrong(primitive, "its joints or weights have another number of elements"));
+            }
+            for (i, (position, sum)) in positions.iter().zip(&mut bent).enumerate() {
+                for k in (0..4).filter(|&k| by[i][k] > 0.0) {
+                    let joint =
+                        joints.get(of[i][k] as usize).ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
+                    *sum = (sum.0 + by[i][k] * joint.transform_point3(*position), sum.1 + by[i][k]);
+                }
+            }
+        }
+        positions
+            .iter_mut()
+            .zip(bent)
+            .filter(|(_, (_, weight))| *weight > 0.0)
+            .for_each(|(position, (sum, weight))| *position = sum / weight);
+        Ok(())
+    }
+
+    fn indices(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Vec<u32>, GltfError> {
+        let all: Vec<u32> = match primitive.indices() {
+            None => (0..count as u32).collect(),
+            Some(accessor) => accessor::numbers(self.source, &accessor)?.into_iter().map(|index| index as u32).collect(),
+        };
+        if let Some(index) = all.iter().find(|&&index| index as usize >= count) {
+            return Err(self.wrong(primitive, &format!("an index is {index}, but there are {count} corners")));
+        }
+        let corners: Vec<[u32; 3]> = match self.triangles {
+            Triangles::List => all.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+            // Every other triangle of a strip turns the other way.
+            Triangles::Strip => {
+                let turned = |(k, t): (usize, &[u32])| if k % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] };
+                all.windows(3).enumerate().map(turned).collect()
+            }
+            Triangles::Fan => all.get(1..).unwrap_or_default().windows(2).map(|t| [t[0], t[1], all[0]]).collect(),
+        };
+        let turned = |[a, b, c]: [u32; 3]| if self.mirrored { [a, c, b] } else { [a, b, c] };
+        Ok(corners.into_iter().filter(|[a, b, c]| a != b && b != c && a != c).flat_map(turned).collect())
+    }
+}

@@ -1,0 +1,236 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use glam::DVec2;
+
+use super::*;
+
+fn data() -> Option<PathBuf> {
+    let found = std::env::var_os("CAMSIM_DATA").map(|data| PathBuf::from(data).join("gltf"));
+    if found.is_none() {
+        eprintln!("CAMSIM_DATA is not set: models of other people are not read");
+    }
+    found
+}
+
+/// A file of one buffer, written out; `rest` is what follows `"asset"`.
+fn model(bytes: &[u8], rest: &str, options: GltfOptions) -> Result<Model, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a b.bin"), bytes).unwrap();
+    let path = folder.path().join("model.gltf");
+    let buffers = format!("\"buffers\": [{{ \"byteLength\": {}, \"uri\": \"a%20b.bin\" }}]", bytes.len());
+    std::fs::write(&path, format!("{{ \"asset\": {{ \"version\": \"2.0\" }}, \"scene\": 0, {buffers}, {rest} }}")).unwrap();
+    read_gltf(&path, options).map_err(|error| error.to_string())
+}
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+/// A square of four corners, (0, 0) to (1, 1), as `mode`; `more` follows the primitive.
+fn square(mode: u32, more: &str, nodes: &str) -> Result<Model, String> {
+    let bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+    let rest = format!(
+        r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}],
+        "accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }}],
+        "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}, "mode": {mode} {more} }}] }}],
+        "nodes": [{nodes}], "scenes": [{{ "nodes": [0] }}]"#
+    );
+    model(&bytes, &rest, GltfOptions::default())
+}
+
+/// Corners of a placed model, north-east-down, triangle by triangle.
+fn corners(model: &Model) -> Vec<[DVec3; 3]> {
+    let of =
+        |mesh: Mesh| mesh.shape.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]].map(|v| mesh.position_ned_m(v))).collect::<Vec<_>>();
+    model.place(DVec3::ZERO, 0.0, 1.0).flat_map(of).collect()
+}
+
+#[test]
+fn strips_and_fans_turn_one_way() {
+    let turns = |model: &Model| corners(model).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect::<Vec<_>>();
+    let strip = turns(&square(5, "", r#"{ "mesh": 0 }"#).unwrap());
+    assert_eq!(strip.len(), 2);
+    // They look along z, which is ahead: north.
+    assert!(strip.iter().all(|turn| turn.distance(DVec3::X) < 1e-12), "{strip:?}");
+    let fan = turns(&square(6, "", r#"{ "mesh": 0 }"#).unwrap());
+    assert_eq!((fan.len(), fan[0].distance(DVec3::X) < 1e-12), (2, true));
+    let lines = square(1, "", r#"{ "mesh": 0 }"#).unwrap();
+    assert_eq!((lines.triangles(), lines.notes.len()), (0, 2));
+}
+
+#[test]
+fn what_is_mirrored_keeps_its_outside() {
+    let mirrored = square(5, "", r#"{ "mesh": 0, "scale": [1, 1, -2] }"#).unwrap();
+    for [a, b, c] in corners(&mirrored) {
+        assert!((b - a).cross(c - a).normalize().distance(-DVec3::X) < 1e-12);
+    }
+    // Its neighbour, which is not, shares none of its triangles.
+    let both = square(5, "", r#"{ "mesh": 0, "children": [1], "scale": [1, 1, -1] }, { "mesh": 0, "scale": [-1, 1, 1] }"#).unwrap();
+    let turns: Vec<f64> = corners(&both).iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).x).collect();
+    assert_eq!(turns, [-1.0, -1.0, -1.0, -1.0]);
+    let meshes: Vec<Mesh> = both.place(DVec3::ZERO, 0.0, 1.0).collect();
+    assert!(!Arc::ptr_eq(&meshes[0].shape, &meshes[1].shape));
+}
+
+#[test]
+fn a_model_stands_with_its_front_to_its_heading() {
+    let square = square(5, "", r#"{ "mesh": 0, "translation": [1, 2, 3] }"#).unwrap();
+    let at = |heading_deg: f64| {
+        let mesh = square.place(DVec3::new(10.0, 20.0, 30.0), f64::to_radians(heading_deg), 2.0).next().unwrap();
+        mesh.position_ned_m(0)
+    };
+    // Left, up, ahead of the origin, twice as large.
+    assert!(at(0.0).distance(DVec3::new(16.0, 18.0, 26.0)) < 1e-12, "{}", at(0.0));
+    assert!(at(90.0).distance(DVec3::new(12.0, 26.0, 26.0)) < 1e-12, "{}", at(90.0));
+}
+
+#[test]
+fn files_that_need_more_or_are_wrong_are_named() {
+    let wrong = |more: &str, nodes: &str| square(4, more, nodes).unwrap_err();
+    for (message, wanted) in [
+        (wrong(r#", "indices": 7"#, r#"{ "mesh": 0 }"#), "is not valid"),
+        (wrong("", r#"{ "mesh": 0, "children": [0] }"#), "nodes.0: has two parents"),
+        (wrong("", r#"{ "mesh": 0, "children": [1] }, { "children": [0] }"#), "has two parents"),
+        (wrong("", r#"{ "mesh": 9 }"#), "is not valid"),
+        (
+            square(4, r#" }] }], "extensionsRequired": ["KHR_draco_mesh_compression"], "x": [{ "y": [{ "z": 1"#, r#"{ "mesh": 0 }"#)
+                .unwrap_err(),
+            "KHR_draco_mesh_compression, which is not supported: write the file again without compression",
+        ),
+        (
+            model(b"", r#""extensionsRequired": ["EXT_meshopt_compression"]"#, GltfOptions::default()).unwrap_err(),
+            "EXT_meshopt_compression",
+        ),
+        (model(b"", r#""extensionsRequired": ["KHR_texture_basisu"]"#, GltfOptions::default()).unwrap_err(), "PNG or JPEG"),
+        (model(b"", r#""scenes": [{ "nodes": [] }]"#, GltfOptions { scene: Some(2), ..GltfOptions::default() }).unwrap_err(), "no scene 2"),
+    ] {
+        assert!(message.contains(wanted) && message.contains("model.gltf"), "{message}");
+    }
+    assert!(read_gltf(Path::new("/none/such.glb"), GltfOptions::default()).unwrap_err().to_string().contains("such.glb: cannot be read"));
+}
+
+#[test]
+fn malformed_files_of_other_people_are_refused() {
+    let Some(data) = data() else { return };
+    for name in ["integer-out-of-bounds", "invalid-buffer-index", "invalid-buffer-view-index", "invalid-primitive-indices"] {
+        let error = read_gltf(&data.join(format!("tinygltf_regression/{name}.gltf")), GltfOptions::default()).unwrap_err().to_string();
+        eprintln!("{error}");
+        assert!(error.contains(name), "{error}");
+    }
+    for (name, triangles) in [
+        ("tinygltf_regression/box01.glb", 12),
+        ("tinygltf_regression/unassigned-skeleton.gltf", 8),
+        ("trimesh/empty_nodes.glb", 0),
+        ("trimesh/cubevc.glb", 48),
+    ] {
+        let model = read_gltf(&data.join(name), GltfOptions::default()).unwrap();
+        assert_eq!(model.triangles(), triangles, "{name}");
+    }
+}
+
+fn all_models(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let is_model = path.extension().is_some_and(|ending| ending == "gltf" || ending == "glb");
+        if path.is_dir() {
+            found.extend(all_models(&path));
+        } else if is_model {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn nothing_panics_on_damaged_files() {
+    let Some(data) = data() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut state = 1_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize
+    };
+    let (mut read, mut refused) = (0, 0);
+    for path in all_models(&data) {
+        let bytes = std::fs::read(&path).unwrap();
+        if bytes.len() > 100_000 {
+            continue;
+        }
+        let damaged = folder.path().join(path.file_name().unwrap());
+        for round in 0..40 {
+            let mut bytes = bytes.clone();
+            if round % 4 == 0 {
+                bytes.truncate(random() % bytes.len());
+            }
+            for _ in 0..1 + round % 8 {
+                let at = random() % bytes.len().max(1);
+                if let Some(byte) = bytes.get_mut(at) {
+                    *byte ^= 1 << (random() % 8);
+                }
+            }
+            std::fs::write(&damaged, &bytes).unwrap();
+            match read_gltf(&damaged, GltfOptions { time_s: Some(0.3), ..GltfOptions::default() }) {
+                Ok(_) => read += 1,
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    eprintln!("{read} damaged files read, {refused} refused");
+    assert!(read > 50 && refused > 200);
+}
+
+#[test]
+fn models_of_other_people_have_the_size_that_they_say() {
+    let Some(data) = data() else { return };
+    let size = |name: &str, time_s: Option<f64>| {
+        let model = read_gltf(&data.join(name), GltfOptions { time_s, ..GltfOptions::default() }).unwrap();
+        let points: Vec<DVec3> = corners(&model).into_iter().flatten().collect();
+        let low = points.iter().fold(DVec3::INFINITY, |low, point| low.min(*point));
+        points.iter().fold(DVec3::NEG_INFINITY, |high, point| high.max(*point)) - low
+    };
+    // Sides of one metre; the same box in four ways of storing it.
+    for name in [
+        "Box/glTF-Binary/Box.glb",
+        "Box/glTF-Embedded/Box.gltf",
+        "BoxInterleaved/glTF/BoxInterleaved.gltf",
+        "BoxTextured/glTF/BoxTextured.gltf",
+    ] {
+        assert!(size(name, None).distance(DVec3::ONE) < 1e-6, "{name}: {}", size(name, None));
+    }
+    // The quantised file is the same cube, to the step of its numbers: weights in bytes move a corner by 2 m / 255 at most.
+    let [cube, quantised] =
+        ["glTF-Binary/AnimatedMorphCube.glb", "glTF-Quantized/AnimatedMorphCube.gltf"].map(|name| format!("AnimatedMorphCube/{name}"));
+    for time_s in [None, Some(0.0), Some(1.3), Some(9.0)] {
+        let (a, b) = (size(&cube, time_s), size(&quantised, time_s));
+        assert!(a.distance(b) < 2.0 / 255.0, "{time_s:?}: {a} {b}");
+    }
+    assert!(size(&cube, Some(1.3)).distance(size(&cube, Some(0.0))) > 0.01 * size(&cube, None).length(), "it changes");
+    // The truck is some 4.8 m long; a fox of 140 units.
+    let truck = size("CesiumMilkTruck/glTF-Binary/CesiumMilkTruck.glb", None);
+    assert!((4.0..6.0).contains(&truck.max_element()), "{truck}");
+    let fox = size("Fox/glTF-Binary/Fox.glb", Some(0.0));
+    assert!((100.0..200.0).contains(&fox.max_element()), "{fox}");
+    // Eight instances of a box at the corners of a larger one.
+    let many = read_gltf(&data.join("SimpleInstancing/glTF/SimpleInstancing.gltf"), GltfOptions::default()).unwrap();
+    assert!(many.triangles() > 12 && many.triangles().is_multiple_of(12), "{}", many.triangles());
+    let meshes: Vec<Mesh> = many.place(DVec3::ZERO, 0.0, 1.0).collect();
+    assert!(meshes.iter().all(|mesh| Arc::ptr_eq(&mesh.shape, &meshes[0].shape)), "instances share their triangles");
+}
+
+#[test]
+fn texture_coordinates_are_turned_as_their_extension_says() {
+    let rule = |rotation: f64, offset: [f64; 2], scale: [f64; 2]| material::UvRule {
+        set: 0,
+        offset,
+        rotation,
+        scale,
+        factor: [1.0; 4],
+        vertex_colors: true,
+    };
+    let at = |rule: material::UvRule, uv: [f64; 2]| DVec2::from_array(rule.apply(uv).map(f64::from));
+    assert!(at(rule(0.0, [0.5, -0.25], [2.0, 3.0]), [0.1, 0.2]).distance(DVec2::new(0.7, 0.35)) < 1e-6);
+    // A quarter anticlockwise as one sees it, where v goes down: u becomes -v.
+    assert!(at(rule(std::f64::consts::FRAC_PI_2, [0.0; 2], [1.0; 2]), [1.0, 0.0]).distance(DVec2::new(0.0, -1.0)) < 1e-6);
+}

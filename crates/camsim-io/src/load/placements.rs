@@ -1,0 +1,107 @@
+//! Tables of places: where copies of a model stand.
+
+use std::path::Path;
+
+use camsim_core::scenario::PatternCentre;
+
+use super::LoadError;
+
+/// One copy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Placement {
+    /// In local north-east-down, or on Earth: degrees and metres.
+    pub place: (PatternCentre, Option<[f64; 3]>),
+    /// Besides the scenario's own.
+    pub heading_deg: f64,
+    /// Times the scenario's own.
+    pub scale: f64,
+}
+
+const COLUMNS: &str = "give a header with n_m,e_m,d_m or lat_deg,lon_deg,height_m and, if wanted, heading_deg and scale";
+
+/// Reads a table with a header; the heights may be missing `on_ground`.
+pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placement>, LoadError> {
+    let fail = |problem: String| LoadError::Placements { path: path.into(), problem };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(|error| fail(format!("cannot be read: {error}; check scene.gltf.placements")))?;
+    let header = reader.headers().map_err(|error| fail(error.to_string()))?.clone();
+    let known = ["n_m", "e_m", "d_m", "lat_deg", "lon_deg", "height_m", "heading_deg", "scale"];
+    if let Some(name) = header.iter().find(|name| !known.contains(&name.trim_start_matches('\u{feff}'))) {
+        return Err(fail(format!("line 1: the column `{name}` says nothing here; {COLUMNS}")));
+    }
+    let column = |name: &str| header.iter().position(|cell| cell.trim_start_matches('\u{feff}') == name);
+    let local = [column("n_m"), column("e_m"), column("d_m")];
+    let earth = [column("lat_deg"), column("lon_deg"), column("height_m")];
+    let complete = |of: [Option<usize>; 3]| of[0].is_some() && of[1].is_some() && (of[2].is_some() || on_ground);
+    let is_local = match (complete(local), complete(earth)) {
+        (true, false) => true,
+        (false, true) => false,
+        _ => return Err(fail(format!("line 1: places are missing, or there are two kinds of them; {COLUMNS}"))),
+    };
+    let mut places = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| fail(error.to_string()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let number = |at: Option<usize>, usual: f64| -> Result<f64, LoadError> {
+            let Some(text) = at.map(|at| record.get(at).unwrap_or_default()) else { return Ok(usual) };
+            let wrong = || fail(format!("line {line}: `{text}` is no finite number"));
+            text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(wrong)
+        };
+        let triple =
+            |of: [Option<usize>; 3]| -> Result<[f64; 3], LoadError> { Ok([number(of[0], 0.0)?, number(of[1], 0.0)?, number(of[2], 0.0)?]) };
+        let place = match is_local {
+            true => (PatternCentre::Ned(triple(local)?), None),
+            false => (PatternCentre::Origin, Some(triple(earth)?)),
+        };
+        let scale = number(column("scale"), 1.0)?;
+        if scale <= 0.0 {
+            return Err(fail(format!("line {line}: the scale is {scale}, not above 0")));
+        }
+        places.push(Placement { place, heading_deg: number(column("heading_deg"), 0.0)?, scale });
+    }
+    if places.is_empty() { Err(fail("has no row: give a place a line".into())) } else { Ok(places) }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn read(text: &str, on_ground: bool) -> Result<Vec<Placement>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("places.csv");
+        std::fs::write(&path, text).unwrap();
+        read_placements(&path, on_ground).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn places_are_read_by_the_names_of_their_columns() {
+        let of = |place, heading_deg, scale| Placement { place, heading_deg, scale };
+        assert_eq!(
+            read("\u{feff}e_m,n_m,d_m,heading_deg\r\n# two\r\n1,2,3,90\r\n4,5,6,0\r\n", false).unwrap(),
+            [of((PatternCentre::Ned([2.0, 1.0, 3.0]), None), 90.0, 1.0), of((PatternCentre::Ned([5.0, 4.0, 6.0]), None), 0.0, 1.0)]
+        );
+        let earth = read("lat_deg,lon_deg,scale\n47,8,2.5\n", true).unwrap();
+        assert_eq!(earth, [of((PatternCentre::Origin, Some([47.0, 8.0, 0.0])), 0.0, 2.5)]);
+    }
+
+    #[test]
+    fn wrong_tables_are_named_by_line() {
+        for (text, on_ground, wanted) in [
+            ("n_m,e_m\n1,2\n", false, "line 1: places are missing"),
+            ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
+            ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
+            ("n_m,e_m\n1,x\n", true, "line 2: `x` is no finite number"),
+            ("n_m,e_m,scale\n1,2,1\n1,2,0\n", true, "line 3: the scale is 0"),
+            ("n_m,e_m\n", true, "has no row"),
+            ("n_m,e_m\n1\n", true, "places.csv"),
+        ] {
+            let error = read(text, on_ground).unwrap_err();
+            assert!(error.contains(wanted) && error.contains("places.csv"), "{error}");
+        }
+    }
+}

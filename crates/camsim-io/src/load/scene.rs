@@ -1,0 +1,126 @@
+//! The scene of a scenario, in the local frame of its log.
+
+use std::{cell::RefCell, sync::Arc};
+
+use camsim_core::{
+    flight_log::{FlightLog, HeightConversion},
+    geodesy::{Geodetic, GeoidCache},
+    scenario::{BoardSpec, GltfSpec, PatternCentre, Scenario},
+    scene::{Encoding, Mesh, Scene, linear_from_srgb, ned_from_board},
+};
+use glam::DVec3;
+
+use super::{
+    LoadError, height_plan,
+    placements::{Placement, read_placements},
+};
+use crate::{
+    board_file::read_board,
+    gltf_file::{GltfOptions, read_gltf},
+    pictures::read_texture,
+    terrain::{TerrainSummary, read_terrain},
+};
+
+/// Reads what `[scene]` names.
+pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>, Vec<String>), LoadError> {
+    let spec = &scenario.scene;
+    let mut scene = Scene {
+        sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
+        fog_visibility_m: spec.fog_visibility_m,
+        ..Scene::default()
+    };
+    let mut summary = None;
+    if let Some(terrain) = &spec.terrain {
+        let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
+        let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
+        let (_, shift_terrain) = height_plan(scenario);
+        let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
+        scene.terrain = Some(loaded.terrain);
+        summary = Some(loaded.summary);
+    }
+    if let Some(pattern) = &spec.pattern {
+        let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
+        let texture = read_texture(&pattern.image, Encoding::Srgb).map_err(of_pattern)?;
+        scene.meshes.push(Mesh::level_picture(Arc::new(texture), local(pattern.at), pattern.width_m));
+    }
+    if let Some(spec) = &spec.board {
+        scene.meshes.push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
+    }
+    let mut notes = Vec::new();
+    for spec in &spec.gltf {
+        notes.extend(add_model(scenario, log, spec, &mut scene)?);
+    }
+    Ok((scene, summary, notes))
+}
+
+/// A model wherever it is to stand; gives what there is to say about it.
+fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut Scene) -> Result<Vec<String>, LoadError> {
+    let number = |n: Option<u32>| n.map(|n| n as usize);
+    let model = read_gltf(&spec.file, GltfOptions { scene: number(spec.scene), time_s: spec.time_s, animation: number(spec.animation) })?;
+    let places = match &spec.placements {
+        None => vec![Placement { place: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
+        Some(path) => read_placements(path, spec.on_ground)?,
+    };
+    let (all, mut without_ground) = (places.len(), 0);
+    for Placement { place: (at, geodetic), heading_deg, scale } in places {
+        let mut at_ned_m = place(scenario, log, at, geodetic, "a place of scene.gltf")?;
+        if spec.on_ground {
+            let ground = scene.terrain.as_ref().and_then(|terrain| terrain.down_at(at_ned_m.x, at_ned_m.y));
+            // Where thousands are scattered some may fall beside the terrain; one that is put there is a mistake, and so are all.
+            let Some(ground_down_m) = ground else {
+                without_ground += 1;
+                if without_ground == all {
+                    return Err(LoadError::NoGround { file: spec.file.clone(), north_m: at_ned_m.x, east_m: at_ned_m.y });
+                }
+                continue;
+            };
+            at_ned_m.z = ground_down_m;
+        }
+        scene.meshes.extend(model.place(at_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale));
+    }
+    let left_out = (without_ground > 0).then(|| format!("{without_ground} of {all} places have no ground below them and are left out"));
+    Ok(model.notes.iter().cloned().chain(left_out).map(|note| format!("{}: {note}", spec.file.display())).collect())
+}
+
+/// Where the middle of a board is.
+///
+/// # Errors
+/// It has a place on Earth, and the log has none.
+pub fn board_place(scenario: &Scenario, board: &BoardSpec, log: &FlightLog) -> Result<DVec3, LoadError> {
+    place(scenario, log, board.at, board.geodetic, "scene.board.geodetic")
+}
+
+fn place(
+    scenario: &Scenario,
+    log: &FlightLog,
+    at: PatternCentre,
+    geodetic: Option<[f64; 3]>,
+    key: &'static str,
+) -> Result<DVec3, LoadError> {
+    let Some([lat_deg, lon_deg, height_m]) = geodetic else { return Ok(local(at)) };
+    let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, key))?;
+    let mut at = Geodetic::from_deg(lat_deg, lon_deg, height_m);
+    // As the log's own heights.
+    if height_plan(scenario).0 == HeightConversion::MslToEllipsoid {
+        at.height_m += undulation(at.lat_rad, at.lon_rad);
+    }
+    Ok(frame.ned_from_geodetic(at))
+}
+
+fn local(at: PatternCentre) -> DVec3 {
+    match at {
+        PatternCentre::Origin => DVec3::ZERO,
+        PatternCentre::Ned(ned) => DVec3::from_array(ned),
+    }
+}
+
+fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
+    LoadError::NoOrigin { log: scenario.flight.log.clone(), key }
+}
+
+/// Height of the geoid above the ellipsoid. One sum of harmonics a vertex would take minutes; the caches interpolate a lattice, one for each
+/// thread that reads terrain.
+fn undulation(lat_rad: f64, lon_rad: f64) -> f64 {
+    thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
+    GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
+}

@@ -1,0 +1,28 @@
+// Where meshes stand, and what is on them.
+#import ideal/surface.wgsl
+
+struct MeshMaterial {
+    // Light of its own; alpha below which there is a hole.
+    emissive_cutoff: vec4<f32>,
+}
+
+@group(1) @binding(2) var<uniform> material: MeshMaterial;
+
+// Rows of base_from_shape: turn, then the shape's origin minus the whole-metre base.
+struct MeshPlacement {
+    x: vec4<f32>,
+    y: vec4<f32>,
+    z: vec4<f32>,
+}
+
+@group(2) @binding(0) var<storage, read> placements: array<MeshPlacement>;
+
+fn base_from_shape(instance: u32, position_m: vec3<f32>) -> vec3<f32> {
+    let placement = placements[instance];
+    let at = vec4<f32>(position_m, 1.0);
+    return vec3<f32>(dot(placement.x, at), dot(placement.y, at), dot(placement.z, at));
+}
+
+fn mesh_color(uv: vec2<f32>, tint: vec4<f32>, in_camera_m: vec3<f32>) -> vec4<f32> {
+    return in_fog(picture_at(uv) * tint.rgb + material.emissive_cutoff.rgb, in_camera_m);
+}
