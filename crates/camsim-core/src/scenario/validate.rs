@@ -3,7 +3,8 @@
 use std::fmt;
 
 use super::{
-    Auto, Axis, BoardSpec, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec,
+    Auto, Axis, BoardSpec, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver,
+    TrackerSpec,
 };
 use crate::{
     plan::MAX_KEYS,
