@@ -5,6 +5,7 @@
 // Twin: camsim_core::temporal::reproject.
 #import reverse/temporal_inverse/interface.wgsl
 #import reverse/temporal_inverse/pose_table.wgsl
+#import <slot:looks>
 
 // Inverse depths after the last look-up, 1/m: what the key frame has there, and what that is on the line's ray.
 struct Settled {
@@ -12,21 +13,21 @@ struct Settled {
     on_line: f32,
 }
 
-// `guess`: what the key frame is taken to have there at first, 1/m.
-fn settle(direction: vec3<f32>, shift: vec3<f32>, guess: f32, iterations: u32) -> Settled {
-    let looks = told(iterations);
-    var settled = Settled(guess, depth_on_line(direction, shift, guess, 0.0));
-    for (var i = 0u; i < looks; i++) {
-        settled.in_key = inverse_depth(ideal_px_from_point(direction + settled.on_line * shift));
-        settled.on_line = depth_on_line(direction, shift, settled.in_key, settled.on_line);
-    }
-    return settled;
+// One look-up further.
+fn look(direction: vec3<f32>, shift: vec3<f32>, before: Settled) -> Settled {
+    let in_key = inverse_depth(ideal_px_from_point(direction + before.on_line * shift));
+    return Settled(in_key, depth_on_line(direction, shift, in_key, before.on_line));
+}
+
+// Beginning with what is infinitely far.
+fn settle(direction: vec3<f32>, shift: vec3<f32>) -> Settled {
+    return first_looks(direction, shift, Settled(0.0, 0.0));
 }
 
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {
     let direction = rotate(pose, vec3<f32>(uv, 1.0));
     let shift = translation(pose);
-    return source_at(direction, shift, settle(direction, shift, 0.0, frame.iterations).on_line);
+    return source_at(direction, shift, settle(direction, shift).on_line);
 }
 
 // The inverse depth on the line's ray of what the key frame has the inverse depth `found` of. At or behind the line's own image plane the
@@ -42,9 +43,16 @@ fn source_at(direction: vec3<f32>, shift: vec3<f32>, w: f32) -> Source {
     return Source(at_px, w, in_key.z > 0.0 && inside_ideal(at_px), ideal_px_from_point(direction));
 }
 
-// The key frame's inverse depth that the last of some look-ups finds, the first of which takes it to be `guess`, 1/m.
-fn settled_inverse_depth(uv: vec2<f32>, pose: Pose, guess: f32, iterations: u32) -> f32 {
-    return settle(rotate(pose, vec3<f32>(uv, 1.0)), translation(pose), guess, iterations).in_key;
+// The key frame's inverse depth that the last look-up finds, 1/m.
+fn settled_inverse_depth(uv: vec2<f32>, pose: Pose) -> f32 {
+    return settle(rotate(pose, vec3<f32>(uv, 1.0)), translation(pose)).in_key;
+}
+
+// The same where the key frame is taken to have `guess` there at first, 1/m.
+fn settled_inverse_depth_from(guess: f32, uv: vec2<f32>, pose: Pose) -> f32 {
+    let direction = rotate(pose, vec3<f32>(uv, 1.0));
+    let shift = translation(pose);
+    return further_looks(direction, shift, Settled(guess, depth_on_line(direction, shift, guess, 0.0))).in_key;
 }
 
 // Where a surface of this inverse depth in the key frame is seen.

@@ -195,6 +195,10 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
         LensModel::KannalaBrandt => (4, "the order is k1 k2 k3 k4"),
     };
     check.require(coefficients.len() <= most, key, || format!("has {} values where at most {most} fit; {order}", coefficients.len()));
+    // Three are what other programs call k1 k2 k3.
+    let radial_alone = model == LensModel::BrownConrady && coefficients.len() == 3;
+    check
+        .require(!radial_alone, key, || format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not"));
 }
 
 fn check_scene(check: &mut Check, scenario: &Scenario) {
@@ -398,6 +402,9 @@ mod tests {
                 s.camera.mount.vibration.push(wrong);
             }),
             ("camera.lens.coefficients", |s| s.camera.lens.coefficients = vec![0.1]),
+            ("camera.lens.coefficients", |s| {
+                s.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.3, 0.1, 0.01] };
+            }),
             ("camera.lens.coefficients", |s| {
                 s.camera.lens.model = LensModel::KannalaBrandt;
                 s.camera.lens.coefficients = vec![0.0; 5];

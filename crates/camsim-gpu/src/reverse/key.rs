@@ -70,6 +70,28 @@ impl From<EdgeStage> for EdgeKind {
     }
 }
 
+/// Depth look-ups of the temporal inverse: few are written out, since loops are dear on software adapters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "numbers")]
+pub enum Looks {
+    One,
+    Two,
+    /// As many as a uniform says.
+    Several,
+}
+
+impl Looks {
+    const ALL: [Self; 3] = [Self::One, Self::Two, Self::Several];
+
+    fn of(temporal: TemporalStage) -> Self {
+        match temporal {
+            TemporalStage::Reproject { iterations: 1 } => Self::One,
+            TemporalStage::Reproject { iterations: 2 } => Self::Two,
+            _ => Self::Several,
+        }
+    }
+}
+
 /// Which stages a kernel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PipelineKey {
@@ -77,12 +99,16 @@ pub struct PipelineKey {
     pub ray: RayStage,
     /// Temporal inverse.
     pub temporal: TemporalKind,
+    /// Depth look-ups, if there are any.
+    pub looks: Looks,
     /// Exposure.
     pub blur: bool,
     /// Where depth is looked up for the nodes of the exposure, if there are any and it is.
     pub depths: NodeDepths,
     /// What joins them.
     pub path: PathStage,
+    /// One polynomial joins all of them.
+    pub one_stretch: bool,
     /// What reads the ideal frame.
     pub tap: TapKind,
     /// What the ideal frames are of.
@@ -109,9 +135,11 @@ impl PipelineKey {
         Self {
             ray: plan.ray,
             temporal,
+            looks: Looks::of(plan.temporal),
             blur: plan.blur.is_some(),
             depths: plan.blur.map_or(NodeDepths::Each, |blur| blur.depths),
             path: plan.blur.map_or(PathStage::Straight, |blur| blur.path),
+            one_stretch: plan.preset != Preset::Paper && plan.blur.is_some_and(|blur| blur.stretches() == 1),
             tap: plan.taps.into(),
             keys: match temporal {
                 _ if plan.keys.len() > 1 => KeyKind::Several,
@@ -154,17 +182,24 @@ impl PipelineKey {
                         for (depths, path) in exposures {
                             for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
                                 let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
-                                keys.extend(truths.iter().map(|&truth| Self {
-                                    ray,
-                                    temporal,
-                                    blur,
-                                    depths,
-                                    path,
-                                    tap,
-                                    keys: key_kind,
-                                    edges,
-                                    truth,
-                                    paper: false,
+                                let looks: &[Looks] = if parallax { &Looks::ALL } else { &[Looks::Several] };
+                                let stretches: &[bool] = if blur { &[false, true] } else { &[false] };
+                                let loops = looks.iter().flat_map(|&looks| stretches.iter().map(move |&one_stretch| (looks, one_stretch)));
+                                keys.extend(loops.flat_map(|(looks, one_stretch)| {
+                                    truths.iter().map(move |&truth| Self {
+                                        ray,
+                                        temporal,
+                                        looks,
+                                        blur,
+                                        depths,
+                                        path,
+                                        one_stretch,
+                                        tap,
+                                        keys: key_kind,
+                                        edges,
+                                        truth,
+                                        paper: false,
+                                    })
                                 }));
                             }
                         }
@@ -177,9 +212,11 @@ impl PipelineKey {
                 keys.extend([false, true].map(|truth| Self {
                     ray,
                     temporal: Rk2,
+                    looks: Looks::Several,
                     blur,
                     depths: NodeDepths::Each,
                     path: PathStage::Straight,
+                    one_stretch: false,
                     tap: TapKind::Bilinear,
                     keys: KeyKind::Single,
                     edges: EdgeKind::None,
@@ -193,7 +230,7 @@ impl PipelineKey {
 
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 12] {
+    pub fn slots(&self) -> [Slot; 14] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -205,6 +242,11 @@ impl PipelineKey {
             TemporalKind::Reproject => "reverse/temporal_inverse/reproject.wgsl",
             TemporalKind::Linear => "reverse/temporal_inverse/linear.wgsl",
             TemporalKind::Rk2 => "reverse/temporal_inverse/rk2.wgsl",
+        };
+        let looks = match self.looks {
+            Looks::One => "reverse/temporal_inverse/looks/one.wgsl",
+            Looks::Two => "reverse/temporal_inverse/looks/two.wgsl",
+            Looks::Several => "reverse/temporal_inverse/looks/several.wgsl",
         };
         let keys = match self.keys {
             KeyKind::Single => "reverse/keys/single.wgsl",
@@ -241,15 +283,18 @@ impl PipelineKey {
             PathStage::Parabola => "reverse/gather/path/parabola.wgsl",
             PathStage::Quartic => "reverse/gather/path/quartic.wgsl",
         };
+        let stretches = if self.one_stretch { "reverse/gather/stretches/one.wgsl" } else { "reverse/gather/stretches/several.wgsl" };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
             ("keys", keys),
             ("ray", ray),
             ("depth", depth),
             ("temporal_inverse", temporal),
+            ("looks", looks),
             ("gather", gather),
             ("nodes", nodes),
             ("path", path),
+            ("stretches", stretches),
             ("tap", tap),
             ("edges", edges),
             ("surface_color", surface_color),
@@ -273,7 +318,12 @@ mod tests {
 
     #[test]
     fn every_variant_is_valid_without_any_capability() {
-        let texts = PipelineKey::all().into_iter().flat_map(|key| {
+        // What fills `looks` and `stretches` knows nothing of lens map and taps: written out, one of each will do.
+        let is_told_apart = |key: &PipelineKey| {
+            let loops = key.looks == Looks::Several && !key.one_stretch;
+            loops || key.ray == RayStage::LensMap && key.tap == TapKind::Spline
+        };
+        let texts = PipelineKey::all().into_iter().filter(is_told_apart).flat_map(|key| {
             let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER] };
             files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
@@ -299,6 +349,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 1448);
+        assert_eq!(PipelineKey::all().len(), 6056);
     }
 }

@@ -4,12 +4,12 @@ var<private> found_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
     let pose = pose_at_node(pixel, 0u);
-    found_depth = settled_inverse_depth(ray.uv, pose, 0.0, frame.iterations);
+    found_depth = settled_inverse_depth(ray.uv, pose);
     return source_of_depth(ray.uv, pose, found_depth);
 }
 
 fn next_node(pixel: vec2<u32>, ray: Ray, node: u32) -> Source {
     let pose = pose_at_node(pixel, node);
-    found_depth = settled_inverse_depth(ray.uv, pose, found_depth, max(frame.iterations, 2u) - 1u);
+    found_depth = settled_inverse_depth_from(found_depth, ray.uv, pose);
     return source_of_depth(ray.uv, pose, found_depth);
 }

@@ -5,8 +5,8 @@ var<private> depth_step: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
     let last = frame.nodes - 1u;
-    first_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, 0u), 0.0, frame.iterations);
-    let last_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, last), first_depth, max(frame.iterations, 2u) - 1u);
+    first_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, 0u));
+    let last_depth = settled_inverse_depth_from(first_depth, ray.uv, pose_at_node(pixel, last));
     depth_step = (last_depth - first_depth) / f32(last);
     return next_node(pixel, ray, 0u);
 }

@@ -2,7 +2,7 @@
 var<private> exposure_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
-    exposure_depth = settled_inverse_depth(ray.uv, pose_mid(pixel), 0.0, frame.iterations);
+    exposure_depth = settled_inverse_depth(ray.uv, pose_mid(pixel));
     return next_node(pixel, ray, 0u);
 }
 
