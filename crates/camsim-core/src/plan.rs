@@ -126,6 +126,8 @@ pub struct FramePlan {
     pub keys: Vec<KeyFrame>,
     /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
     pub shared_by: Option<[u64; 2]>,
+    /// Why there is no other.
+    pub alone: Option<&'static str>,
     /// Pixels of each ideal frame.
     pub ideal: IdealGeometry,
     /// Lens inverse.
@@ -282,7 +284,11 @@ impl Planner {
     /// # Errors
     /// A zoom value without a usable camera; an ideal frame larger than the renderer can hold.
     pub fn plan(&self, frame: u64) -> Result<FramePlan, PlanError> {
-        self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)
+        let mut plan = self.shared_plan(frame).map_or_else(|| self.plan_alone(frame), Ok)?;
+        if plan.shared_by.is_none() {
+            plan.alone = Some(self.why_alone(&plan));
+        }
+        Ok(plan)
     }
 
     /// The plan of a frame by itself.
@@ -400,6 +406,7 @@ impl Planner {
             key_twist,
             keys,
             shared_by: None,
+            alone: None,
             ideal,
             ray,
             temporal,

@@ -126,7 +126,12 @@ fn who_shares_depends_on_the_scenario_alone() {
 fn what_moves_too_far_is_not_shared() {
     let group = |sequence: &Arc<Sequence>| {
         let planner = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner");
-        planner.plan(5).expect("a plan").shared_by
+        let plan = planner.plan(5).expect("a plan");
+        // One of both, and the description has it.
+        assert_eq!(plan.shared_by.is_none(), plan.alone.is_some());
+        let told = plan.alone.map_or_else(|| "one for frames".to_owned(), |why| format!("for this frame alone ({why})"));
+        assert!(plan.passes().iter().any(|pass| pass.starts_with("ideal: ") && pass.contains(&told)), "{:?}", plan.passes());
+        plan.shared_by
     };
     let turning = |deg_s: f64| flight(DVec3::ZERO, DVec3::new(0.0, 0.0, deg_s.to_radians()), 8);
     assert_eq!(group(&turning(20.0)), Some([0, 7]));

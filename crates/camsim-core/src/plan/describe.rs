@@ -39,6 +39,8 @@ pub struct PlanSummary<'a> {
     pub key_times_s: Vec<f64>,
     /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
     pub shared_by: Option<[u64; 2]>,
+    /// Why that is so.
+    pub alone: Option<&'static str>,
     /// Passes in order.
     pub passes: Vec<String>,
     /// Lens inverse.
@@ -82,7 +84,11 @@ impl FramePlan {
             SurfaceReads::Four => "4 texture reads a pixel",
             SurfaceReads::Grid => "up to 2x32 texture reads a pixel",
         };
-        let shared = self.shared_by.map_or_else(String::new, |[first, last]| format!(", one for frames {first} to {last}"));
+        let shared = match (self.shared_by, self.alone) {
+            (Some([first, last]), _) => format!(", one for frames {first} to {last}"),
+            (None, Some(why)) => format!(", for this frame alone ({why})"),
+            (None, None) => String::new(),
+        };
         let mut passes = Vec::new();
         if self.ray == RayStage::LensMap {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
@@ -165,6 +171,7 @@ impl FramePlan {
             ideal_principal_px: self.ideal.principal_px.to_array(),
             key_s: self.key_s,
             shared_by: self.shared_by,
+            alone: self.alone,
             key_times_s: self.keys.iter().map(|key| key.t_s).collect(),
             passes: self.passes(),
             ray: self.ray,

@@ -102,13 +102,31 @@ impl Planner {
 
     /// Whether the scenario leaves it to the plan how frames are made.
     fn may_share(&self) -> bool {
+        self.forbids_sharing().is_none()
+    }
+
+    /// What in the scenario has each frame made by itself.
+    fn forbids_sharing(&self) -> Option<&'static str> {
         let quality = &self.sequence.scenario.quality;
-        quality.frames_per_ideal > 1
-            && quality.preset == Preset::Default
-            && quality.solver == Auto::Auto
-            && quality.key_frames == Auto::Auto
-            && quality.silhouettes != Silhouettes::Rays
-            && self.zoom.is_none()
+        let reasons = [
+            (quality.preset == Preset::Paper, "quality.preset = \"paper\""),
+            (quality.frames_per_ideal == 1, "quality.frames_per_ideal = 1"),
+            (quality.solver != Auto::Auto, "quality.solver is given"),
+            (quality.key_frames != Auto::Auto, "quality.key_frames is given"),
+            (quality.silhouettes == Silhouettes::Rays, "quality.silhouettes = \"rays\""),
+            (self.zoom.is_some(), "the lens zooms"),
+        ];
+        reasons.into_iter().find_map(|(holds, reason)| holds.then_some(reason))
+    }
+
+    /// Why a frame that does not share its ideal frame does not.
+    pub(super) fn why_alone(&self, plan: &FramePlan) -> &'static str {
+        match self.forbids_sharing() {
+            Some(reason) => reason,
+            None if plan.edges.has_rays() => "rays at its silhouettes: another instant sees more of what is behind them",
+            None if self.sequence.frames == 1 => "there is no other",
+            None => "from a common one it or its neighbours would not keep the tolerances, or not for less time",
+        }
     }
 
     /// A fault of its middle frame is that frame's own: the others are then planned by themselves, and so is it, when it is asked for.

@@ -72,9 +72,10 @@ impl From<EdgeStage> for EdgeKind {
 
 /// Depth look-ups of the temporal inverse: few are written out, since loops are dear on software adapters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "numbers")]
 pub enum Looks {
+    /// One.
     One,
+    /// Two.
     Two,
     /// As many as a uniform says.
     Several,
