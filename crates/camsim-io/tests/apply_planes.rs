@@ -208,7 +208,8 @@ fn sources_are_those_of_rays_into_the_scene() {
     );
     // The test sees what it is about.
     assert!(clear.len() > 60_000 && near.len() > 1_000 && hidden > 500, "{} {} {hidden}", clear.len(), near.len());
-    // The contract is 0.05 RMS. What is left (3e-3) is of the mean over the pixel's area, which the oracle does not take.
+    // The contract is 0.05 RMS; 0.003 is measured. Over planes the sources are exact to 1e-6 (core's tests), but here colours tell them, which
+    // the gather reads between pixels.
     assert!(rms(&clear) < 0.01 && worst < 0.02, "{} {worst}", rms(&clear));
     // A wrong side of a silhouette is possible within half a texel of it, and nothing else is.
     assert!(right > 0.6, "{right}");
