@@ -412,3 +412,73 @@ fn somebody_elses_picture_goes_through_the_camera() {
     let (code, _, err) = camsim(["apply", text(&camera), text(&frame), "-o", text(&out)]);
     assert!(code == 2 && err.contains("shutter.readout_ms: must be"), "{err}");
 }
+
+#[test]
+fn a_folder_of_pictures_goes_through_the_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    fs::create_dir(file("rgb")).unwrap();
+    for i in 0..4 {
+        fs::copy(assets().join("acircles.png"), file(&format!("rgb/{i}.5.png"))).unwrap();
+    }
+    let (camera, frames, out) = (file("CAMERA.toml"), file("FRAMES.toml"), file("out"));
+    fs::write(&camera, "size_px = [64, 48]\nfocal_px = [60.0, 60.0]\n[shutter]\nreadout_ms = 33.0\n[photometric]\nnoise_sigma = 0.01\n")
+        .unwrap();
+    let twist = "color = \"rgb/*.png\"\nname_unit = \"s\"\nfocal_px = [300.0, 300.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 1.0]\n";
+    fs::write(&frames, twist).unwrap();
+    let apply = |more: &[&str]| camsim(["apply", text(&camera), text(&frames), "-o", text(&out)].iter().chain(more).copied());
+    let (code, _, err) = apply(&["--frames", "1..3", "--format", "png,exr"]);
+    assert!(code == 0 && err.contains("2 frames in"), "{err}");
+    let table = fs::read_to_string(out.join("frames.csv")).unwrap();
+    let rows: Vec<&str> = table.lines().collect();
+    assert_eq!(rows[0], "frame,stamp_ns,from_color,from_depth,color_png,color_exr,valid");
+    assert!(
+        rows.len() == 3 && rows[1].starts_with("1,1500000000,") && rows[1].ends_with("color/frame_000001.exr,valid/frame_000001.png"),
+        "{table}"
+    );
+    for name in ["color/frame_000002.png", "valid/frame_000002.png", "run.json", "camera.toml"] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    assert!(!out.join("color/frame_000000.png").exists() && !out.join("depth").exists());
+
+    // What is there stays as it is, what is missing is the same as in one run, and the table holds both.
+    let kept = fs::read(out.join("color/frame_000001.exr")).unwrap();
+    fs::remove_file(out.join("color/frame_000002.exr")).unwrap();
+    let (code, _, err) = apply(&["--resume", "--format", "png,exr"]);
+    assert!(code == 0 && err.contains("3 frames (1 were there)"), "{err}");
+    assert_eq!(fs::read(out.join("color/frame_000001.exr")).unwrap(), kept);
+    assert_eq!(fs::read_to_string(out.join("frames.csv")).unwrap().lines().count(), 5);
+    let alone = file("alone");
+    assert_eq!(camsim(["-q", "apply", text(&camera), text(&frames), "-o", text(&alone), "--frames", "1"]).0, 0);
+    assert_eq!(fs::read(alone.join("color/frame_000001.exr")).unwrap(), kept, "a frame does not depend on those beside it");
+    let noise = |frame: u32| fs::read(out.join(format!("color/frame_00000{frame}.exr"))).unwrap();
+    assert_ne!(noise(1), noise(2), "noise is of the frame");
+
+    // Its own table is a table of frames.
+    let again = file("AGAIN.toml");
+    fs::write(&again, "frames = \"out/frames.csv\"\nfocal_px = [60.0, 60.0]\n").unwrap();
+    let (code, _, err) = camsim(["apply", text(&camera), text(&again), "-o", text(&file("twice")), "--frames", "0"]);
+    assert!(code == 0, "{err}");
+
+    let (code, _, err) = apply(&["--resume", "--seed", "3"]);
+    assert!(code == 2 && err.contains("seed was 0, now 3"), "{err}");
+    let (code, _, err) = apply(&["--frames", "3..9"]);
+    assert!(code == 2 && err.contains("names frames 0 to 3"), "{err}");
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&file("p.png"))]);
+    assert!(code == 2 && err.contains("names 4 frames, so it must be a folder"), "{err}");
+
+    // A trajectory that does not reach all frames is told before anything is written.
+    fs::write(file("poses.csv"), "t_s,x,y,z,qw,qx,qy,qz\n1,0,0,0,1,0,0,0\n3,0,0,0,1,0,0,0\n").unwrap();
+    fs::write(&frames, twist.replace("angular_rate_rad_s = [0.0, 0.0, 1.0]", "trajectory = \"poses.csv\"")).unwrap();
+    let new = file("new");
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new)]);
+    assert!(code == 2 && err.contains("2 of 4 frames, first frame 0") && err.contains("it covers --frames 1..=2"), "{err}");
+    assert!(!new.exists());
+
+    // One frame has no folder.
+    fs::write(&frames, "color = \"rgb/0.5.png\"\nfocal_px = [300.0, 300.0]\n").unwrap();
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new)]);
+    assert!(code == 2 && err.contains("one frame is one picture"), "{err}");
+    let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&file("p.png")), "--resume"]);
+    assert!(code == 2 && err.contains("--resume is for many frames"), "{err}");
+}

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use crate::{
-    camera::{CameraError, CameraModel},
+    camera::CameraModel,
     frame::RenderedFrame,
     noise::tail_table,
     photometric::{photometric, vignette_weights},
@@ -21,18 +21,20 @@ use crate::{
     scenario::{CameraSpec, Preset, Solver},
     scene::{linear_from_srgb, srgb_from_linear},
     sequence::GrayImage,
-    shutter::{Shutter, ShutterError},
+    shutter::Shutter,
     temporal::{
-        ColorImage, Footprint, IdealGeometry, InverseDepthImage, Source, TapStage,
+        ColorImage, Footprint, InverseDepthImage, Source, TapStage,
         displacement::{self, RK2_STEP_DEG, Twist},
         gather, samples_for,
     },
 };
 
+mod ideal;
 mod motion;
 pub mod paper;
 mod search;
 
+pub use ideal::{ApplyError, IdealFrame, Unseen, UnseenCounts};
 pub use motion::{Motion, PoseRow, PoseTrack, PoseTrackError};
 use search::DepthEdges;
 
@@ -52,77 +54,6 @@ const EDGE_PARALLAX_PX: f64 = 0.1;
 const JUMP: f64 = 0.1;
 /// Miss of the polyline at the exposure's middle beyond which every sample is solved on its own, pixels.
 const BENT_PX: f64 = 0.05;
-
-/// Why the pipeline cannot run.
-#[derive(Debug, thiserror::Error)]
-pub enum ApplyError {
-    /// The camera.
-    #[error(transparent)]
-    Camera(#[from] CameraError),
-    /// The shutter.
-    #[error(transparent)]
-    Shutter(#[from] ShutterError),
-    /// The frame's images.
-    #[error("the ideal frame has {what}: {fix}")]
-    Frame {
-        /// What is wrong.
-        what: String,
-        /// What to do.
-        fix: &'static str,
-    },
-    /// The motion.
-    #[error(transparent)]
-    Motion(#[from] PoseTrackError),
-    /// A solver that needs a scene.
-    #[error("solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)")]
-    Oracle,
-    /// Linear fog outside of the paper's preset.
-    #[error(
-        "fog is a part of the ideal frame; the linear fog added afterwards belongs to the paper's methods: use the preset \"paper\", or leave fog out"
-    )]
-    Fog,
-}
-
-/// A pinhole RGB-D picture with its geometry.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IdealFrame {
-    /// Its pixels; usually larger than the output's, so that lens and motion find sources.
-    pub geometry: IdealGeometry,
-    /// Linear R G B A, row-major; A is not used.
-    pub color_rgba: Vec<f32>,
-    /// Inverse planar depth, 1/m, row-major; 0 = infinitely far (sky, or unknown).
-    pub inverse_depth: Vec<f32>,
-    /// When it was taken, seconds after the stamp.
-    pub instant_s: f64,
-}
-
-impl IdealFrame {
-    /// Planes that fill the geometry, and finite values.
-    fn check(&self) -> Result<(), ApplyError> {
-        let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });
-        let [width, height] = self.geometry.size_px.map(|side| side as usize);
-        if width == 0 || height == 0 {
-            return frame("no pixel".into(), "give pictures of at least 1x1");
-        }
-        if self.color_rgba.len() != 4 * width * height || self.inverse_depth.len() != width * height {
-            return frame(
-                format!("{} colour and {} depth values for {width}x{height} pixels", self.color_rgba.len(), self.inverse_depth.len()),
-                "colour and depth must have one size",
-            );
-        }
-        let DVec2 { x: fx, y: fy } = self.geometry.focal_px;
-        if !(fx.is_finite() && fy.is_finite() && fx > 0.0 && fy > 0.0 && self.geometry.principal_px.is_finite()) {
-            return frame(format!("focal_px [{fx}, {fy}]"), "give positive finite focal lengths and a finite principal point");
-        }
-        if self.inverse_depth.iter().any(|w| !(w.is_finite() && *w >= 0.0)) {
-            return frame("depths that are negative or not finite".into(), "0 stands for unknown or infinitely far");
-        }
-        if self.color_rgba.iter().any(|v| !v.is_finite()) {
-            return frame("colours that are not finite".into(), "clean the picture before: NaN would spread over every blur path");
-        }
-        Ok(())
-    }
-}
 
 /// How to do it.
 #[derive(Clone, Debug, PartialEq)]
@@ -200,19 +131,25 @@ impl<'a> Pipeline<'a> {
         self.nodes
     }
 
-    /// Where a pixel looks in the ideal frame at exposure phase `phase` (-0.5 begin, 0.5 end). `None` without an ideal ray, behind the ideal
-    /// camera, or outside the ideal frame.
-    #[must_use]
-    pub fn source(&self, pixel: [u32; 2], phase: f64) -> Option<Source> {
-        let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
+    /// Where a pixel looks in the ideal frame at exposure phase `phase` (-0.5 begin, 0.5 end).
+    ///
+    /// # Errors
+    /// Why it sees nothing.
+    pub fn source(&self, pixel: [u32; 2], phase: f64) -> Result<Source, Unseen> {
+        let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))).ok_or(Unseen::NoRay)?;
         self.source_of_ray(uv, self.shutter.dt_pixel_s(pixel[0], pixel[1]) + phase * self.shutter.exposure_s())
     }
 
     /// As [`Pipeline::source`], of an ideal ray at an instant.
-    fn source_of_ray(&self, uv: DVec2, dt_s: f64) -> Option<Source> {
+    fn source_of_ray(&self, uv: DVec2, dt_s: f64) -> Result<Source, Unseen> {
         let ideal = &self.frame.geometry;
+        let holes = &self.frame.holes;
         if self.solver == Solver::Reproject {
-            return self.edges.source(uv, self.motion.key_from(dt_s, self.frame.instant_s), &self.depth(), ideal);
+            return self.edges.source(uv, self.motion.key_from(dt_s, self.frame.instant_s), &self.depth(), holes, ideal);
+        }
+        // These read the depth where the ray would look if nothing moved.
+        if !holes.is_empty() && holes[self.depth().nearest_index(ideal.px_from_point(uv.extend(1.0)))] {
+            return Err(Unseen::Hole);
         }
         let inverse_depth = self.inverse_depth_of_ray(uv);
         let shift_s = dt_s - self.frame.instant_s;
@@ -221,7 +158,7 @@ impl<'a> Pipeline<'a> {
             _ => displacement::rk2(uv, inverse_depth, &self.twist, shift_s, RK2_STEP_DEG.to_radians()),
         };
         let at_px = ideal.px_from_point(moved.extend(1.0));
-        (at_px.is_finite() && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth })
+        if at_px.is_finite() && ideal.contains(at_px) { Ok(Source { at_px, inverse_depth }) } else { Err(Unseen::Outside) }
     }
 
     /// The paper's models take the depth where the ray would look if nothing moved: the nearest texel in its own preset, bilinear else.
@@ -245,10 +182,16 @@ impl<'a> Pipeline<'a> {
     /// The finished picture, with depth in each line's own camera. `vignette` is the map of `photometric.vignette`, read.
     #[must_use]
     pub fn render(&self, vignette: Option<&GrayImage>) -> RenderedFrame {
+        self.render_and_count(vignette).0
+    }
+
+    /// As [`Pipeline::render`], with the pixels that show nothing.
+    #[must_use]
+    pub fn render_and_count(&self, vignette: Option<&GrayImage>) -> (RenderedFrame, UnseenCounts) {
         let size_px @ [width, height] = self.camera.size_px;
         let weights = vignette.map(|map| vignette_weights(map, size_px, self.spec.photometric.vignette_thresholds));
         let table = tail_table();
-        let pixels: Vec<Option<([f32; 3], f32)>> = (0..height)
+        let pixels: Vec<Result<([f32; 3], f32), Unseen>> = (0..height)
             .into_par_iter()
             .flat_map_iter(|y| (0..width).map(move |x| [x, y]))
             .map(|pixel| {
@@ -258,12 +201,15 @@ impl<'a> Pipeline<'a> {
             .collect();
         let color_rgba = pixels.iter().flat_map(|found| found.map_or([0.0; 4], |([r, g, b], _)| [r, g, b, 1.0])).collect();
         let depth_m = pixels.iter().map(|found| found.map_or(0.0, |(_, depth_m)| depth_m)).collect();
-        RenderedFrame { index: self.settings.frame, size_px, color_rgba, depth_m: Some(depth_m), ..RenderedFrame::default() }
+        let mut counts = UnseenCounts::default();
+        pixels.iter().filter_map(|found| found.err()).for_each(|why| counts.add(why));
+        let frame = RenderedFrame { index: self.settings.frame, size_px, color_rgba, depth_m: Some(depth_m), ..RenderedFrame::default() };
+        (frame, counts)
     }
 
-    /// Linear colour and depth; `None` is invalid. What the vignette blackens is not gathered.
-    fn pixel(&self, pixel: [u32; 2], weight: f32, table: &[f32]) -> Option<([f32; 3], f32)> {
-        let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
+    /// Linear colour and depth. What the vignette blackens is not gathered.
+    fn pixel(&self, pixel: [u32; 2], weight: f32, table: &[f32]) -> Result<([f32; 3], f32), Unseen> {
+        let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]))).ok_or(Unseen::NoRay)?;
         let dt_s = self.shutter.dt_pixel_s(pixel[0], pixel[1]);
         let middle = self.source_of_ray(uv, dt_s);
         let depth_m = middle.map_or(0.0, |source| if source.inverse_depth > 0.0 { (1.0 / source.inverse_depth) as f32 } else { 0.0 });
@@ -271,25 +217,26 @@ impl<'a> Pipeline<'a> {
         let finish =
             |color: DVec3| photometric(&self.spec.photometric, color.as_vec3().to_array(), weight, pixel, frame, self.settings.seed, table);
         if weight <= 0.0 {
-            return Some((finish(DVec3::ZERO), depth_m));
+            return Ok((finish(DVec3::ZERO), depth_m));
         }
         if self.settings.preset == Preset::Paper {
             // Vignette, light and noise act on stored values too; only then is the picture decoded, so that files are linear or encoded as ever.
             let stored = finish(self.gather_paper(uv, dt_s)?);
-            return Some((stored.map(linear_from_srgb), depth_m));
+            return Ok((stored.map(linear_from_srgb), depth_m));
         }
-        Some((finish(self.gather_exact(uv, dt_s, middle?)?), depth_m))
+        Ok((finish(self.gather_exact(uv, dt_s, middle?)?), depth_m))
     }
 
-    /// Mean over the exposure and the pixel's area, in linear light. A pixel that looks outside of the ideal frame at any node has none.
-    fn gather_exact(&self, uv: DVec2, dt_s: f64, middle: Source) -> Option<DVec3> {
+    /// Mean over the exposure and the pixel's area, in linear light. A pixel that looks outside of the ideal frame, or into a hole of
+    /// its depth, at any node has none.
+    fn gather_exact(&self, uv: DVec2, dt_s: f64, middle: Source) -> Result<DVec3, Unseen> {
         let area = self.footprint(uv, dt_s, &middle);
         let exposure_s = self.shutter.exposure_s();
         if self.nodes < 2 {
-            return Some(gather(&[middle.at_px], PathStage::Straight, &area, &self.color(), SAMPLES_PER_PX, MAX_SAMPLES));
+            return Ok(gather(&[middle.at_px], PathStage::Straight, &area, &self.color(), SAMPLES_PER_PX, MAX_SAMPLES));
         }
         let at_node = |k: u32| dt_s + exposure_s * (f64::from(k) / f64::from(self.nodes - 1) - 0.5);
-        let sources: Option<Vec<Source>> = (0..self.nodes).map(|k| self.source_of_ray(uv, at_node(k))).collect();
+        let sources: Result<Vec<Source>, Unseen> = (0..self.nodes).map(|k| self.source_of_ray(uv, at_node(k))).collect();
         let sources = sources?;
         let nodes_px: Vec<DVec2> = sources.iter().map(|source| source.at_px).collect();
         let (per_px, cap) = match self.settings.blur_samples {
@@ -297,7 +244,7 @@ impl<'a> Pipeline<'a> {
             None => (SAMPLES_PER_PX, MAX_SAMPLES),
         };
         if !self.meets_edge(dt_s, &sources, middle.at_px) {
-            return Some(gather(&nodes_px, PathStage::Straight, &area, &self.color(), per_px, cap));
+            return Ok(gather(&nodes_px, PathStage::Straight, &area, &self.color(), per_px, cap));
         }
         // Surfaces that part over the exposure: every sample finds its own.
         let length_px: f64 = nodes_px.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
@@ -308,7 +255,7 @@ impl<'a> Pipeline<'a> {
             let source = self.source_of_ray(uv, dt_s + phase * exposure_s);
             source.map(|source| area.tap_color(&color, source.at_px, i))
         };
-        let sum: Option<DVec3> = (0..count).map(sample).sum();
+        let sum: Result<DVec3, Unseen> = (0..count).map(sample).sum();
         sum.map(|sum| sum / f64::from(count))
     }
 

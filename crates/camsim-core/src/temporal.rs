@@ -69,9 +69,15 @@ impl InverseDepthImage<'_> {
     /// The nearest texel, edges held.
     #[must_use]
     pub fn nearest(&self, at_px: DVec2) -> f64 {
+        f64::from(self.values[self.nearest_index(at_px)])
+    }
+
+    /// Where the nearest texel stands in the values, edges held.
+    #[must_use]
+    pub fn nearest_index(&self, at_px: DVec2) -> usize {
         let last = DVec2::new(f64::from(self.size_px[0] - 1), f64::from(self.size_px[1] - 1));
         let at = (at_px + 0.5).floor().clamp(DVec2::ZERO, last);
-        f64::from(self.values[at.y as usize * self.size_px[0] as usize + at.x as usize])
+        at.y as usize * self.size_px[0] as usize + at.x as usize
     }
 
     /// Largest less smallest of the four texels around a position.

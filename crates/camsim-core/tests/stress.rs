@@ -80,6 +80,7 @@ fn level(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, f32) + Syn
         geometry,
         color_rgba: looks.iter().flat_map(|(_, v)| [*v, *v, *v, 1.0]).collect(),
         inverse_depth: looks.iter().map(|(w, _)| *w as f32).collect(),
+        holes: Vec::new(),
         instant_s: 0.0,
     }
 }
@@ -163,7 +164,7 @@ fn a_second_of_rolling_shutter_over_buildings() {
         }
         let exact = ideal.geometry.px_from_point(hit);
         let two_looks = reproject(uv, (rotation, shift), 2, &depth, &ideal.geometry);
-        let found = pipelines.iter().map(|pipeline| pipeline.source([x, y], 0.0)).chain([two_looks]);
+        let found = pipelines.iter().map(|pipeline| pipeline.source([x, y], 0.0).ok()).chain([two_looks]);
         for (errors, found) in errors.iter_mut().zip(found) {
             errors.push(found.unwrap().at_px.distance(exact));
         }

@@ -3,11 +3,14 @@
 //! ```toml
 //! color = "ideal.png"                # EXR (linear), PNG, JPEG, BMP; alpha is not read
 //! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR
+//! color_channels = ["R", "G", "B"]   # of an EXR, one is grey; a whole name, or the end of one: "Combined.R"
+//! color_layer = "ViewLayer.Combined" # of an EXR: its channels are taken from there
 //! depth = "depth.exr"                # EXR Z in metres, 16-bit PNG or PGM with depth_per_metre, or packed24
+//! depth_channel = "Depth.Z"          # of an EXR, and depth_layer, as above
 //! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
 //! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers only: 0.001 to 1e6
 //! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
-//! holes = "far"                      # where there is no depth; or "nearest": that of the nearest pixel that has one
+//! holes = "far"                      # where there is no depth; "nearest": that of the nearest pixel that has one; "mark": nothing is shown
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
 //! principal_point_px = [543.5, 407.5]  # default: its centre
 //! instant_ms = 0.0                   # when it was taken, from the stamp t_i
@@ -15,14 +18,18 @@
 //! velocity_m_s = [0.0, 0.0, 0.0]
 //! angular_rate_rad_s = [0.0, 0.0, 0.628]
 //! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera),
+//! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw without a header
 //! # stamp_s = 12.5                   #     and the stamp on their clock
 //! # [fog]                            # preset "paper" only: linear fog, added after the blur
 //! # end_m = 12000.0
 //! # color = [0.5, 0.6, 0.7]          # stored values
 //! ```
 //!
+//! Many frames in one file: [`list`] says how they are named.
+//!
 //! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone,
-//! or, with `holes = "nearest"`, as what is beside it (a depth camera's shadows; not for pictures with sky).
+//! or, with `holes = "nearest"`, as what is beside it (a depth camera's shadows; not for pictures with sky), or, with `holes = "mark"`, not
+//! at all: output pixels that look there are invalid.
 //! A picture of nothing but 0 and infinity may be sky; one of nothing but what no depth can be (negative, not a number, nearer than a
 //! micrometre) is refused: it is in another sign or unit.
 //!
@@ -32,8 +39,8 @@
 use std::path::{Path, PathBuf};
 
 use camsim_core::{
-    apply::{IdealFrame, Motion, PoseTrack, PoseTrackError, paper::LinearFog},
-    temporal::{IdealGeometry, displacement::Twist},
+    apply::{IdealFrame, Motion, PoseTrackError, paper::LinearFog},
+    temporal::IdealGeometry,
 };
 use glam::{DVec2, DVec3};
 use serde::Deserialize;
@@ -42,9 +49,14 @@ use thiserror::Error;
 use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
 mod depth;
+mod exr_planes;
 mod images;
+pub mod list;
 mod poses;
 mod schema;
+mod set;
+
+pub use set::{FrameSet, read_frame_set};
 
 /// Why a frame file cannot be used.
 #[derive(Debug, Error)]
@@ -70,7 +82,7 @@ pub enum FrameFileError {
         /// What is wrong and what to do.
         message: String,
     },
-    /// The table of poses.
+    /// A table of poses or of frames.
     #[error("{}{}: {message}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Poses {
         /// The table.
@@ -94,9 +106,17 @@ pub enum FrameFileError {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FrameSpec {
-    color: PathBuf,
+    frames: Option<PathBuf>,
+    name_unit: Option<NameUnit>,
+    fps: Option<f64>,
+    max_gap_ms: Option<f64>,
+    color: Option<PathBuf>,
     color_space: Option<ColorSpace>,
+    color_channels: Option<Vec<String>>,
+    color_layer: Option<String>,
     depth: Option<PathBuf>,
+    depth_channel: Option<String>,
+    depth_layer: Option<String>,
     #[serde(default)]
     depth_encoding: DepthEncoding,
     depth_per_metre: Option<f64>,
@@ -119,6 +139,8 @@ struct MotionSpec {
     velocity_m_s: Option<[f64; 3]>,
     angular_rate_rad_s: Option<[f64; 3]>,
     trajectory: Option<PathBuf>,
+    #[serde(default)]
+    trajectory_format: TrajectoryFormat,
     stamp_s: Option<f64>,
 }
 
@@ -158,6 +180,37 @@ enum Holes {
     #[default]
     Far,
     Nearest,
+    Mark,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum TrajectoryFormat {
+    #[default]
+    Csv,
+    Tum,
+}
+
+/// What a whole number in a file's name counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum NameUnit {
+    S,
+    Ms,
+    Us,
+    Ns,
+}
+
+impl FrameSpec {
+    /// The first key that chooses a channel of an EXR's colour.
+    fn color_key(&self) -> Option<&'static str> {
+        self.color_channels.as_ref().map(|_| "color_channels").or(self.color_layer.as_ref().map(|_| "color_layer"))
+    }
+
+    /// The same of its depth.
+    fn depth_key(&self) -> Option<&'static str> {
+        self.depth_channel.as_ref().map(|_| "depth_channel").or(self.depth_layer.as_ref().map(|_| "depth_layer"))
+    }
 }
 
 /// A frame file, read with everything that it names.
@@ -173,36 +226,48 @@ pub struct FrameFile {
     pub without_depth: f64,
 }
 
-/// Reads a frame file, its pictures and its poses.
+/// Reads a frame file of one frame, its pictures and its poses.
 ///
 /// # Errors
 /// [`FrameFileError`] names the file, the key where there is one, and what to do.
 pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
+    read_frame_set(path)?.read(0)
+}
+
+/// The keys of a frame file, each by itself as it should be.
+fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     let mut tree = Tree::read(path, "")?;
     let problems = check::check(&mut tree, &schema::FRAME, "");
     if !problems.is_empty() {
         return Err(ScenarioError::Problems(problems).into());
     }
     let spec: FrameSpec = deserialize(&tree)?;
-    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
+    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
     if !spec.focal_px.iter().all(|f| f.is_finite() && *f > 0.0) {
-        return Err(fail("focal_px", "must be [fx, fy], both finite and above 0; for a mirrored axis flip the pictures instead"));
+        return fail("focal_px", "must be [fx, fy], both finite and above 0; for a mirrored axis flip the pictures instead");
     }
     if !spec.instant_ms.is_finite() {
-        return Err(fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp"));
+        return fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp");
     }
-    let color = images::read_color(&spec.color, spec.color_space)?;
+    if spec.principal_point_px.is_some_and(|centre| centre.iter().any(|v| !v.is_finite())) {
+        return fail("principal_point_px", "must be two finite numbers; leave the key out for the picture's centre");
+    }
+    if spec.color_channels.as_ref().is_some_and(|names| !matches!(names.len(), 1 | 3)) {
+        return fail("color_channels", "must be one name (grey) or three (red, green, blue)");
+    }
+    Ok(spec)
+}
+
+/// Reads the pictures of one frame.
+fn read_pictures(spec: &FrameSpec, color: &Path, depth: Option<&Path>, motion: Motion, path: &Path) -> Result<FrameFile, FrameFileError> {
+    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
+    let color = images::read_color(color, spec, path)?;
     let size_px @ [width, height] = color.size_px;
-    let focal_px = DVec2::from_array(spec.focal_px);
     let centre = [0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0)];
     let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(centre));
-    if !principal_px.is_finite() {
-        return Err(fail("principal_point_px", "must be two finite numbers; leave the key out for the picture's centre"));
-    }
-    let geometry = IdealGeometry { size_px, focal_px, principal_px };
-    let motion = read_motion(&spec.motion, path)?;
-    let mut inverse_depth = match &spec.depth {
-        Some(depth) => depth::read_inverse_depth(depth, &spec, &geometry, path)?,
+    let geometry = IdealGeometry { size_px, focal_px: DVec2::from_array(spec.focal_px), principal_px };
+    let mut inverse_depth = match depth {
+        Some(depth) => depth::read_inverse_depth(depth, spec, &geometry, color.origin_px, path)?,
         None if motion.translates() => {
             return Err(fail(
                 "depth",
@@ -219,41 +284,16 @@ pub fn read_frame(path: &Path) -> Result<FrameFile, FrameFileError> {
         None => None,
     };
     let without_depth = inverse_depth.iter().filter(|w| **w == 0.0).count() as f64 / inverse_depth.len() as f64;
-    if spec.holes == Holes::Nearest {
-        depth::fill_holes(&mut inverse_depth, size_px);
+    let mut holes = Vec::new();
+    match spec.holes {
+        Holes::Far => {}
+        Holes::Nearest => depth::fill_holes(&mut inverse_depth, size_px),
+        // Of a picture without depth, which only turns, nothing is missing.
+        Holes::Mark if depth.is_some() => holes = inverse_depth.iter().map(|w| *w == 0.0).collect(),
+        Holes::Mark => {}
     }
-    let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, instant_s: 1e-3 * spec.instant_ms };
+    let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, holes, instant_s: 1e-3 * spec.instant_ms };
     Ok(FrameFile { frame, motion, fog, without_depth })
-}
-
-/// A twist (nothing given is no motion) or a table of poses, not both.
-fn read_motion(spec: &MotionSpec, path: &Path) -> Result<Motion, FrameFileError> {
-    let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
-    let Some(trajectory) = &spec.trajectory else {
-        if spec.stamp_s.is_some() {
-            return Err(fail(
-                "motion.stamp_s",
-                "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out",
-            ));
-        }
-        let [velocity, rate] = [spec.velocity_m_s, spec.angular_rate_rad_s].map(|v| DVec3::from_array(v.unwrap_or_default()));
-        for (key, value) in [("motion.velocity_m_s", velocity), ("motion.angular_rate_rad_s", rate)] {
-            if !value.is_finite() {
-                return Err(fail(key, "must be three finite numbers, in camera axes: x right, y down, z forward"));
-            }
-        }
-        return Ok(Motion::Twist(Twist { velocity_m_s: velocity, rate_rad_s: rate }));
-    };
-    if spec.velocity_m_s.is_some() || spec.angular_rate_rad_s.is_some() {
-        return Err(fail("motion", "has both a twist and a trajectory; give one of them"));
-    }
-    let Some(stamp_s) = spec.stamp_s else {
-        return Err(fail("motion.stamp_s", "is missing: give the stamp of the frame on the clock of motion.trajectory"));
-    };
-    let rows = poses::read_poses(trajectory, stamp_s)?;
-    // Rows come counted from the stamp.
-    let track = PoseTrack::new(rows, 0.0).map_err(|source| FrameFileError::Track { path: trajectory.clone(), source })?;
-    Ok(Motion::Poses(track))
 }
 
 #[cfg(test)]

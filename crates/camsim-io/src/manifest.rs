@@ -54,7 +54,7 @@ pub enum ResumeError {
         message: String,
     },
     /// Other scenario.
-    #[error("{} was made by another scenario: {}; render without --resume, or into another folder", path.display(), differences.join("; "))]
+    #[error("{} was made by another scenario: {}; render without --resume, or into another folder", path.display(), shortened(differences))]
     Differs {
         /// The file.
         path: PathBuf,
@@ -79,11 +79,28 @@ impl RunManifest {
     }
 }
 
+/// Most differences that an error lists.
+const MOST_LISTED: usize = 5;
+
+fn shortened(differences: &[String]) -> String {
+    let listed = differences[..differences.len().min(MOST_LISTED)].join("; ");
+    let more = differences.len().saturating_sub(MOST_LISTED);
+    if more > 0 { format!("{listed}; and {more} more") } else { listed }
+}
+
 /// Whether frames already in `folder` belong to `scenario`. A folder without `run.json` holds none: `Ok(false)`.
 ///
 /// # Errors
 /// `run.json` cannot be read, or another scenario made it.
 pub fn check_resume(folder: &Path, scenario: &Scenario) -> Result<bool, ResumeError> {
+    check_resume_of(folder, "scenario", scenario)
+}
+
+/// As [`check_resume`], of whatever stands under `key` in `run.json`.
+///
+/// # Errors
+/// As [`check_resume`].
+pub fn check_resume_of(folder: &Path, key: &str, here: &impl Serialize) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
@@ -92,9 +109,9 @@ pub fn check_resume(folder: &Path, scenario: &Scenario) -> Result<bool, ResumeEr
     };
     let parse = |error: serde_json::Error| ResumeError::Parse { path: path.clone(), message: error.to_string() };
     let there: Value = serde_json::from_str(&text).map_err(parse)?;
-    let there = there.get("scenario").ok_or_else(|| ResumeError::Parse { path: path.clone(), message: "it has no scenario".into() })?;
+    let there = there.get(key).ok_or_else(|| ResumeError::Parse { path: path.clone(), message: format!("it has no {key}") })?;
     // Through text, so that numbers that print alike are alike.
-    let here: Value = serde_json::to_string(scenario).and_then(|text| serde_json::from_str(&text)).map_err(parse)?;
+    let here: Value = serde_json::to_string(here).and_then(|text| serde_json::from_str(&text)).map_err(parse)?;
     let mut differences = Vec::new();
     compare(there, &here, "", &mut differences);
     if differences.is_empty() { Ok(true) } else { Err(ResumeError::Differs { path, differences }) }

@@ -180,11 +180,11 @@ impl Model<'_> {
         let has = |fault| faults.contains(&fault);
         let n = |key: &str| self.golden.numbers[key];
         let uv = self.camera.unproject(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])))?;
-        let inverse_depth = self.pipeline.source(pixel, 0.0)?.inverse_depth;
+        let inverse_depth = self.pipeline.source(pixel, 0.0).ok()?.inverse_depth;
         let sky = inverse_depth == 0.0;
         let at_phase = |phase: f64| {
             if !(sky && has(Fault::SkyIsNear)) {
-                return Some(self.pipeline.source(pixel, phase)?.at_px);
+                return Some(self.pipeline.source(pixel, phase).ok()?.at_px);
             }
             // That program's row times, from the ideal frame's instant.
             let row = f64::from(pixel[1]);
@@ -399,7 +399,7 @@ fn own_methods_beside_the_reference_programs() {
         let mut off_px = Vec::new();
         for (x, y) in (0..height).step_by(3).flat_map(|y| (0..width).step_by(3).map(move |x| (x, y))) {
             for phase in [-0.5, 0.5] {
-                if let (Some(a), Some(b)) = (exact.source([x, y], phase), heun.source([x, y], phase)) {
+                if let (Ok(a), Ok(b)) = (exact.source([x, y], phase), heun.source([x, y], phase)) {
                     off_px.push(a.at_px.distance(b.at_px));
                 }
             }

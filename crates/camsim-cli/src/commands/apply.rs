@@ -4,30 +4,42 @@ use std::{path::PathBuf, time::Instant};
 
 use anyhow::anyhow;
 use camsim_core::{
-    apply::{ApplyError, Pipeline, Settings},
+    apply::{ApplyError, Pipeline, Settings, UnseenCounts},
     scenario::{MAX_BLUR_SAMPLES, Preset, Solver},
 };
-use camsim_io::{frame_file::read_frame, pictures::read_gray_image, scenario_file::read_checked_camera, write::write_picture};
+use camsim_io::{
+    frame_file::{FrameFile, FrameSet, read_frame_set},
+    pictures::read_gray_image,
+    scenario_file::read_checked_camera,
+    write::write_picture,
+};
 
 use crate::{
     console::Console,
     failure::{Failure, OrFail},
+    frame_list::FrameList,
     inputs::PresetArg,
 };
+
+mod folder;
 
 /// Put an ideal RGB-D picture of any origin through a camera
 ///
 /// Takes a picture with depth from Blender, AirSim, Gazebo or a depth camera, and gives what the camera would have taken: lens, delay,
 /// rolling shutter, exposure, interlacing, vignette, light, noise. In f64 on all cores; needs no graphics adapter. What the ideal picture
-/// does not show (beyond its border) is alpha 0.
+/// does not show (beyond its border) is alpha 0. A FRAME.toml that names a folder or a table of pictures gives a folder of frames.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 FRAME.toml (paths relative to it):
   color = \"ideal.png\"          EXR (linear), PNG, JPEG, BMP; color_space = \"srgb\" | \"linear\"
+  color_channels = [\"R\", \"G\", \"B\"], color_layer; depth_channel = \"Depth.Z\", depth_layer
+                               of an EXR with several layers or parts: whole names, or their ends; a name that is not there
+                               gets a list of those that are
   depth = \"depth.exr\"          EXR Z in metres, or 16-bit PNG or PGM with depth_per_metre (0.001 to 1e6), or 8-bit RGB PNG
                                with depth_encoding = \"packed24\"; positive forward, 0 is unknown or sky: infinitely far
   depth_kind = \"planar\"        | \"range\"
-  holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one
+  holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one | \"mark\": what looks
+                               there is alpha 0
   focal_px = [307.6, 307.6]    of the ideal picture, which may be larger than the output
   principal_point_px = [543.5, 407.5]
   instant_ms = 0.0             when it was taken, from the stamp
@@ -35,19 +47,28 @@ FRAME.toml (paths relative to it):
                                with the camera ...
   velocity_m_s = [0.0, 0.0, 0.0]
   angular_rate_rad_s = [0.0, 0.0, 0.628]
-  trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera), and stamp_s
+  trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera), and stamp_s;
+                               trajectory_format = \"tum\": t x y z qx qy qz qw without a header
   [fog]                        end_m, color: with --preset paper only
+
+Many frames, in place of color, depth and stamp_s:
+  color = \"rgb/*.png\", depth = \"depth/*.png\"   paired by what stands for the *; name_unit = \"s\" | \"ms\" | \"us\" | \"ns\" says that it is
+                               a time: then paired with the nearest within max_gap_ms = 20
+  color = \"rgb.txt\", depth = \"depth.txt\"       lists of `time file`
+  frames = \"associations.txt\"                   a table of `time color time depth`, or a .csv of t_s (or stamp_ns), color, depth
+  fps = 30                     times for frames that have none, from motion.stamp_s on
 
 Examples:
   camsim apply CAMERA.toml FRAME.toml -o picture.png
   camsim apply CAMERA.toml FRAME.toml --solver rk2 -o linear.exr
-  camsim apply CAMERA.toml FRAME.toml --preset paper --blur-samples 10 -o paper.png")]
+  camsim apply CAMERA.toml FRAME.toml --preset paper --blur-samples 10 -o paper.png
+  camsim apply CAMERA.toml FRAMES.toml -o out --frames 0..100 --resume")]
 pub struct Args {
     /// Camera file: the keys of [camera] at its root
     camera: PathBuf,
     /// The ideal picture and how its camera moved
     frame: PathBuf,
-    /// Where the picture goes: .exr is linear R G B A with depth Z, .png is encoded as photometric.output says
+    /// Where the picture goes: .exr is linear R G B A with depth Z, .png is encoded as photometric.output says; of many frames a folder
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Temporal inverse: reproject is exact, linear and rk2 are the paper's eqs. 16 and 18 [default: reproject; rk2, and no other, with
@@ -63,7 +84,16 @@ pub struct Args {
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Frame number, which the noise depends on
+    /// Which of many frames: 7, 10..20 (without 20), 10..=20, 10.. or several with commas; all if left out
+    #[arg(long, value_name = "LIST")]
+    frames: Option<FrameList>,
+    /// Of many frames: keep those that are there already; refused if the folder is of other inputs
+    #[arg(long)]
+    resume: bool,
+    /// Of many frames: formats of their colour [default: exr]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    format: Vec<folder::Format>,
+    /// Frame number, or that of the first of many, which the noise depends on
     #[arg(long, default_value_t = 0, value_name = "N")]
     frame_number: u64,
 }
@@ -81,16 +111,16 @@ enum SolverArg {
 
 /// Reads, renders, writes.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    if !["exr", "png"].iter().any(|known| ending.eq_ignore_ascii_case(known)) {
-        return Err(Failure::bad_input(anyhow!(
-            "-o {}: the name must end in .exr or .png, which chooses the format",
-            args.output.display()
-        )));
-    }
     // As a scenario does.
     if args.preset == PresetArg::Paper && args.solver.is_some_and(|solver| solver != SolverArg::Rk2) {
         return Err(Failure::bad_input(anyhow!("--solver is rk2 with --preset paper; leave it out, or leave --preset out")));
+    }
+    let is_picture = ends_as_picture(args);
+    if !is_picture && args.output.extension().is_some() && !args.output.is_dir() {
+        return Err(Failure::bad_input(anyhow!(
+            "-o {}: the name must end in .exr or .png, which chooses the format; of many frames it is a folder, whose name has no ending",
+            args.output.display()
+        )));
     }
     let spec = read_checked_camera(&args.camera).or_bad_input()?;
     for (present, key) in [(!spec.zoom.is_empty(), "zoom"), (!spec.mount.vibration.is_empty(), "mount.vibration")] {
@@ -98,14 +128,61 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             console.warn(format_args!("{}: {key} is not used: the frame has one calibration and its own motion", args.camera.display()));
         }
     }
-    let file = read_frame(&args.frame).or_bad_input()?;
+    let set = read_frame_set(&args.frame).or_bad_input()?;
+    let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;
+    if set.is_several() {
+        return folder::run(args, &spec, &set, vignette.as_ref(), console);
+    }
+    refuse_options_of_many(args, is_picture)?;
+    let file = read(args, &set, 0, console)?;
+    let begin = Instant::now();
+    let settings = settings(args, &file, 0);
+    let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
+    let (picture, unseen) = pipeline.render_and_count(vignette.as_ref());
+    let elapsed_s = begin.elapsed().as_secs_f64();
+    write_picture(&args.output, &picture, spec.photometric.output).or_failed()?;
+
+    let [width, height] = spec.size_px;
+    console.note(format_args!("{}: {width}x{height}, {elapsed_s:.2} s", args.output.display()));
+    tell_unseen(&unseen, f64::from(width) * f64::from(height), console);
+    console.detail(format_args!("{:.1} % of the ideal picture has no depth", 100.0 * file.without_depth));
+    console.detail(format_args!("{} exposure nodes", pipeline.nodes()));
+    Ok(())
+}
+
+fn ends_as_picture(args: &Args) -> bool {
+    let ending = args.output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    ["exr", "png"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// Of one frame there is nothing to choose or to resume.
+fn refuse_options_of_many(args: &Args, is_picture: bool) -> Result<(), Failure> {
+    if !is_picture {
+        let message = "one frame is one picture, whose name must end in .exr or .png, which chooses the format";
+        return Err(Failure::bad_input(anyhow!("-o {}: {message}", args.output.display())));
+    }
+    let given = [("--frames", args.frames.is_some()), ("--resume", args.resume), ("--format", !args.format.is_empty())];
+    match given.into_iter().find(|(_, given)| *given) {
+        Some((option, _)) => {
+            Err(Failure::bad_input(anyhow!("{option} is for many frames, and {} names one; leave it out", args.frame.display())))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Frame `index`, with a warning where its depth says nothing.
+fn read(args: &Args, set: &FrameSet, index: usize, console: &mut Console<'_>) -> Result<FrameFile, Failure> {
+    let file = set.read(index).or_bad_input()?;
     if file.without_depth == 1.0 && file.motion.translates() {
         let frame = args.frame.display();
         console
             .warn(format_args!("{frame}: no pixel has a depth: all is taken as infinitely far, and the camera's velocity changes nothing"));
     }
-    let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;
-    let settings = Settings {
+    Ok(file)
+}
+
+fn settings(args: &Args, file: &FrameFile, index: u64) -> Settings {
+    Settings {
         preset: if args.preset == PresetArg::Paper { Preset::Paper } else { Preset::Default },
         solver: args.solver.map(|solver| match solver {
             SolverArg::Linear => Solver::Linear,
@@ -115,26 +192,23 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         blur_samples: args.blur_samples,
         fog: file.fog,
         seed: args.seed,
-        frame: args.frame_number,
-    };
-    let begin = Instant::now();
-    let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
-    let picture = pipeline.render(vignette.as_ref());
-    let elapsed_s = begin.elapsed().as_secs_f64();
-    write_picture(&args.output, &picture, spec.photometric.output).or_failed()?;
-
-    let all = f64::from(spec.size_px[0]) * f64::from(spec.size_px[1]);
-    let blind = picture.color_rgba.iter().skip(3).step_by(4).filter(|alpha| **alpha == 0.0).count() as f64;
-    console.note(format_args!("{}: {}x{}, {elapsed_s:.2} s", args.output.display(), spec.size_px[0], spec.size_px[1]));
-    if blind > 0.0 {
-        console.warn(format_args!(
-            "{:.2} % of the picture is empty (alpha 0): the lens has no ray there, or the ideal picture does not show what it looks at; a larger ideal picture helps against the latter",
-            100.0 * blind / all
-        ));
+        frame: args.frame_number.saturating_add(index),
     }
-    console.detail(format_args!("{:.1} % of the ideal picture has no depth and counts as infinitely far", 100.0 * file.without_depth));
-    console.detail(format_args!("{} exposure nodes", pipeline.nodes()));
-    Ok(())
+}
+
+/// What is empty, and why.
+fn tell_unseen(unseen: &UnseenCounts, pixels: f64, console: &mut Console<'_>) {
+    let percent = |count: u64| 100.0 * count as f64 / pixels;
+    let reasons = [
+        (unseen.no_ray, "the lens has no ray there"),
+        (unseen.outside, "beyond the border of the ideal picture, which should be larger"),
+        (unseen.holes, "where the ideal picture has no depth (holes = \"mark\")"),
+    ];
+    let reasons: Vec<String> =
+        reasons.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{:.2} % {why}", percent(*count))).collect();
+    if unseen.all() > 0 {
+        console.warn(format_args!("{:.2} % of the picture is empty (alpha 0): {}", percent(unseen.all()), reasons.join("; ")));
+    }
 }
 
 /// The file that an error is about, before its words.

@@ -16,7 +16,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::Pipeline;
+use super::{Pipeline, Unseen};
 use crate::temporal::paper::{gather_straight, linear_fog};
 
 /// Samples over the exposure, as in the paper's section 8.9.
@@ -40,13 +40,13 @@ impl LinearFog {
 }
 
 impl Pipeline<'_> {
-    /// Mean of stored values over the exposure, with fog. `None` if either end of the path is outside of the ideal frame; between them
+    /// Mean of stored values over the exposure, with fog. An error if either end of the path is outside of the ideal frame; between them
     /// nothing can be, because a rectangle holds the segment between any two of its points.
-    pub(super) fn gather_paper(&self, uv: DVec2, dt_s: f64) -> Option<DVec3> {
+    pub(super) fn gather_paper(&self, uv: DVec2, dt_s: f64) -> Result<DVec3, Unseen> {
         let half_s = 0.5 * self.shutter.exposure_s();
         let ends_px = [self.source_of_ray(uv, dt_s - half_s)?.at_px, self.source_of_ray(uv, dt_s + half_s)?.at_px];
         let samples = if half_s > 0.0 { self.settings.blur_samples.unwrap_or(BLUR_SAMPLES) } else { 1 };
         let mean = gather_straight(ends_px, samples, &self.stored());
-        Some(self.settings.fog.map_or(mean, |fog| fog.over(mean, uv, self.inverse_depth_of_ray(uv))))
+        Ok(self.settings.fog.map_or(mean, |fog| fog.over(mean, uv, self.inverse_depth_of_ray(uv))))
     }
 }

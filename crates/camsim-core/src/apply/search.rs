@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use super::Unseen;
 use crate::temporal::{
     IdealGeometry, InverseDepthImage, Source,
     marks::{EDGE_STEP, steps},
@@ -20,6 +21,10 @@ const ONE_SURFACE_PX: f64 = 0.02;
 /// Movement of the source at which the fixed point has been reached, ideal pixels.
 const SETTLED_PX: f64 = 1e-8;
 const MAX_STEPS: u32 = 32;
+/// How often a path's near end is looked for again, by what its own tiles hold.
+const SHORTENINGS: u32 = 4;
+/// Share of the inverse depth above which another look would shorten it by little.
+const SHORTER: f64 = 0.9;
 
 /// What a tile of the depth image holds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -61,48 +66,77 @@ impl DepthEdges {
         Self { tiles, columns, rows, high }
     }
 
-    /// Where the ray `uv` of a line's camera looks in the ideal frame; `None` behind the ideal camera or outside of its frame.
+    /// Where the ray `uv` of a line's camera looks in the ideal frame. `holes` says which texels' depth is unknown; empty is none.
     pub(super) fn source(
         &self,
         uv: DVec2,
         key_from_line: (DMat3, DVec3),
         depth: &InverseDepthImage<'_>,
+        holes: &[bool],
         ideal: &IdealGeometry,
-    ) -> Option<Source> {
+    ) -> Result<Source, Unseen> {
         let (rotation, shift) = key_from_line;
-        let path = Path { direction: rotation * uv.extend(1.0), shift, depth, ideal };
+        let path = Path { direction: rotation * uv.extend(1.0), shift, depth, holes, ideal };
         if path.direction.z <= 0.0 {
-            return None;
+            return Err(Unseen::Outside);
         }
-        let nearest = path.nearest(self.high);
-        let (far_px, near_px) = (path.place(0.0), path.place(nearest));
-        let settled = path.fixed_point();
-        let several = far_px.distance(near_px) > ONE_SURFACE_PX && self.several(far_px, near_px, nearest);
-        let inverse_depth = match settled {
-            Some(w) if !several => w,
-            _ => path.first_surface(nearest, far_px.distance(near_px)),
+        let inverse_depth = match self.several(&path) {
+            Some(nearest) => path.first_surface(nearest)?,
+            // One surface: the fixed point finds it, but for one that is as steep as the path.
+            None => match path.fixed_point() {
+                Some(w) => w,
+                None => path.first_surface(path.nearest(self.high))?,
+            },
         };
         let in_key = path.direction + inverse_depth * shift;
         let at_px = ideal.px_from_point(in_key);
-        (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth })
+        if !(in_key.z > 0.0 && ideal.contains(at_px)) {
+            return Err(Unseen::Outside);
+        }
+        if path.is_hole(at_px) { Err(Unseen::Hole) } else { Ok(Source { at_px, inverse_depth }) }
     }
 
-    /// Whether surfaces that parallax tells apart lie along a path.
-    fn several(&self, a_px: DVec2, b_px: DVec2, nearest: f64) -> bool {
+    /// If surfaces that parallax tells apart lie along a path: the inverse depth in the line's camera that none of them exceeds.
+    fn several(&self, path: &Path<'_>) -> Option<f64> {
+        let far_px = path.place(0.0);
+        let mut nearest = path.nearest(self.high);
+        let mut box_high = self.high;
+        // What is nearest of all the picture is seldom near this path: its near end comes nearer, and so do the tiles that it meets.
+        for _ in 0..SHORTENINGS {
+            let near_px = path.place(nearest);
+            let length_px = far_px.distance(near_px);
+            if length_px <= ONE_SURFACE_PX {
+                return None;
+            }
+            let tile = self.around(far_px, near_px);
+            if !(tile.broken && f64::from(tile.high - tile.low) * length_px > ONE_SURFACE_PX * nearest) {
+                return None;
+            }
+            let high = f64::from(tile.high);
+            let enough = high > SHORTER * box_high;
+            box_high = high;
+            nearest = nearest.min(path.nearest(high));
+            if enough {
+                break;
+            }
+        }
+        Some(nearest)
+    }
+
+    /// The tiles around a path in one.
+    fn around(&self, a_px: DVec2, b_px: DVec2) -> Tile {
         let last = [f64::from(self.columns - 1), f64::from(self.rows - 1)];
         // A texel more on each side, which bilinear reading reaches.
         let tile = |at: f64, last: f64| (at / f64::from(TILE)).floor().clamp(0.0, last) as u32;
         let (low, high) = (a_px.min(b_px) - 1.0, a_px.max(b_px) + 1.0);
-        let (mut broken, mut near, mut far) = (false, 0.0_f32, f32::INFINITY);
+        let mut all = Tile { low: f32::INFINITY, high: 0.0, broken: false };
         for row in tile(low.y, last[1])..=tile(high.y, last[1]) {
             for column in tile(low.x, last[0])..=tile(high.x, last[0]) {
                 let tile = &self.tiles[(row * self.columns + column) as usize];
-                broken |= tile.broken;
-                near = near.max(tile.high);
-                far = far.min(tile.low);
+                all = Tile { low: all.low.min(tile.low), high: all.high.max(tile.high), broken: all.broken || tile.broken };
             }
         }
-        broken && f64::from(near - far) * a_px.distance(b_px) > ONE_SURFACE_PX * nearest
+        all
     }
 }
 
@@ -111,12 +145,18 @@ struct Path<'a> {
     direction: DVec3,
     shift: DVec3,
     depth: &'a InverseDepthImage<'a>,
+    holes: &'a [bool],
     ideal: &'a IdealGeometry,
 }
 
 impl Path<'_> {
     fn place(&self, w: f64) -> DVec2 {
         self.ideal.px_from_point(self.direction + w * self.shift)
+    }
+
+    /// Whether the texel at a place has no depth.
+    fn is_hole(&self, at_px: DVec2) -> bool {
+        !self.holes.is_empty() && self.holes[self.depth.nearest_index(at_px)]
     }
 
     /// The line camera's inverse depth of a surface that the ideal frame shows at `in_key`; 0 for what lies behind the line's camera.
@@ -157,29 +197,31 @@ impl Path<'_> {
 
     /// Inverse depth of the nearest surface that the ray meets. From the near end on, the ray's point is in front of what the ideal frame
     /// shows there until it first is not: between two such looks it goes through a surface, or behind the edge of one. What the ideal
-    /// camera did not see cannot be known: then the farthest surface seen beside it stands in.
-    fn first_surface(&self, nearest: f64, length_px: f64) -> f64 {
+    /// camera did not see cannot be known: then the farthest surface seen beside it stands in, which a hole is not.
+    fn first_surface(&self, nearest: f64) -> Result<f64, Unseen> {
+        let length_px = self.place(0.0).distance(self.place(nearest));
         let looks = (length_px / LOOK_PX).ceil().clamp(2.0, MAX_LOOKS);
         let px_per_w = length_px / nearest.max(1e-300);
         let mut before = (nearest, self.found(nearest) - nearest);
-        let mut farthest = before.1 + nearest;
+        let seen = |w: f64, found: f64| if self.is_hole(self.place(w)) { f64::INFINITY } else { found };
+        let mut farthest = seen(nearest, before.1 + nearest);
         if before.1.abs() * px_per_w < SETTLED_PX {
-            return nearest;
+            return Ok(nearest);
         }
         for i in 1..=looks as u32 {
             let w = nearest * (1.0 - f64::from(i) / looks);
             let found = self.found(w);
             let here = (w, found - w);
-            farthest = farthest.min(found);
+            farthest = farthest.min(seen(w, found));
             if before.1 < 0.0
                 && here.1 >= 0.0
                 && let Some(met) = self.between(before, here, px_per_w)
             {
-                return met;
+                return Ok(met);
             }
             before = here;
         }
-        farthest
+        if farthest.is_finite() { Ok(farthest) } else { Err(Unseen::Hole) }
     }
 
     /// Bisection for `found(w) = w`; `None` if it ends at a jump.

@@ -20,6 +20,7 @@ fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3]))
         geometry,
         color_rgba: looks.iter().flat_map(|(_, [r, g, b])| [*r, *g, *b, 1.0]).collect(),
         inverse_depth: looks.iter().map(|(w, _)| *w as f32).collect(),
+        holes: Vec::new(),
         instant_s: 0.0,
     }
 }
@@ -217,4 +218,48 @@ fn frames_that_cannot_be_used_are_refused() {
     for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
         assert_eq!(Pipeline::new(&blurred, &good, &about, &solver(which)).unwrap().render(None).color_rgba, [0.0; 48]);
     }
+}
+
+/// A far wall, a hole in the depth and a near wall side by side: what looks into the hole has no answer, with every solver, and is counted.
+#[test]
+fn what_looks_into_a_marked_hole_is_empty_and_counted() {
+    let spec = camera([60, 20], 50.0, ShutterSpec { exposure_ms: 10.0, ..ShutterSpec::default() });
+    let mut ideal = frame([120, 40], 50.0, |uv| (if uv.x < 0.0 { 0.1 } else { 0.5 }, [0.5; 3]));
+    // Columns 55..65: 5 of each wall.
+    ideal.holes = (0..120 * 40).map(|i| (55..65).contains(&(i % 120))).collect();
+    ideal.inverse_depth.iter_mut().zip(&ideal.holes).filter(|(_, hole)| **hole).for_each(|(w, _)| *w = 0.0);
+    let still = Motion::Twist(Twist::default());
+    for which in [Solver::Linear, Solver::Rk2, Solver::Reproject] {
+        let pipeline = Pipeline::new(&spec, &ideal, &still, &solver(which)).unwrap();
+        let (rendered, counts) = pipeline.render_and_count(None);
+        assert_eq!(counts, UnseenCounts { holes: 10 * 20, ..UnseenCounts::default() }, "{which:?}");
+        let alpha = |x: usize| rendered.color_rgba[4 * (60 * 7 + x) + 3];
+        assert_eq!((24..36).map(alpha).collect::<Vec<_>>(), [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.], "{which:?}");
+    }
+    // 0.4 m to the right, 100 ms before: the far wall by 0.4 * 0.1 * 50 = 2 px, the near one by 10. Every ray that meets neither wall where
+    // it was seen is empty, and none stands in with infinity.
+    let motion = Motion::Twist(Twist { velocity_m_s: DVec3::new(-4.0, 0.0, 0.0), ..Twist::default() });
+    let late = camera([60, 20], 50.0, ShutterSpec { delay_ms: 100.0, ..ShutterSpec::default() });
+    let pipeline = Pipeline::new(&late, &ideal, &motion, &Settings::default()).unwrap();
+    let mut seen = [0; 3];
+    for x in 0..60 {
+        // Where the ray would look on either wall: 2 px to the right on the far one, 10 on the near one.
+        let (on_far, on_near) = (x + 30 + 2, x + 30 + 10);
+        let expected = if on_near >= 65 {
+            Some((on_near, 0.5))
+        } else if on_far < 55 {
+            Some((on_far, 0.1))
+        } else {
+            None
+        };
+        match (pipeline.source([x, 9], 0.0), expected) {
+            (Ok(found), Some((at, w))) => {
+                assert!((found.at_px.x - f64::from(at)).abs() < 1e-4 && (found.inverse_depth - w).abs() < 1e-6, "{x}: {found:?}");
+                seen[if w > 0.2 { 0 } else { 1 }] += 1;
+            }
+            (Err(Unseen::Hole), None) => seen[2] += 1,
+            other => panic!("{x}: {other:?}"),
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 0), "{seen:?}");
 }

@@ -4,11 +4,12 @@ use std::path::Path;
 
 use camsim_core::temporal::IdealGeometry;
 use glam::DVec2;
-use image::DynamicImage;
+use image::{DynamicImage, ImageFormat};
 
 use super::{
     DepthEncoding, DepthKind, FrameFileError, FrameSpec,
-    images::{failure, is_exr, list, open, read_exr},
+    exr_planes::read_exr,
+    images::{failure, is_exr, open},
 };
 
 /// Depth of the reference program's cleared buffer, metres: all three bytes full.
@@ -23,6 +24,7 @@ pub(super) fn read_inverse_depth(
     path: &Path,
     spec: &FrameSpec,
     geometry: &IdealGeometry,
+    color_origin_px: Option<[i32; 2]>,
     frame_path: &Path,
 ) -> Result<Vec<f32>, FrameFileError> {
     let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
@@ -34,10 +36,25 @@ pub(super) fn read_inverse_depth(
                 "\"packed24\" is of 8-bit RGB pictures, and depth is an EXR, whose Z is in metres; leave it out",
             ));
         }
-        let (size_px, values) = read_exr_depth(path)?;
-        (size_px, values, false)
+        let picture = read_exr(path)?;
+        let plane = picture.depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref()).map_err(|message| failure(path, message))?;
+        if color_origin_px.is_some_and(|origin_px| origin_px != plane.origin_px) {
+            let message = format!(
+                "{}: begins at pixel {:?} of its file, the colour elsewhere: they must cover the same pixels",
+                plane.name, plane.origin_px
+            );
+            return Err(failure(path, message));
+        }
+        (plane.size_px, plane.values.iter().map(|&z| f64::from(z)).collect(), false)
     } else {
-        let picture = open(path)?;
+        if let Some(key) = spec.depth_key() {
+            return Err(fail(key, "is for EXR, and depth is none; leave it out"));
+        }
+        let (picture, format) = open(path)?;
+        if packed && !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
+            let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
+            return Err(failure(path, message));
+        }
         let size_px = [picture.width(), picture.height()];
         if packed { (size_px, packed24(&picture, path)?, false) } else { (size_px, whole_numbers(&picture, path)?, true) }
     };
@@ -127,18 +144,6 @@ fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(),
              positive forward (OpenGL's z is the negative of it), 0 where it is unknown"
         ),
     ))
-}
-
-/// The channel `Z`, under any layer name, or the only channel.
-fn read_exr_depth(path: &Path) -> Result<([u32; 2], Vec<f64>), FrameFileError> {
-    let picture = read_exr(path)?;
-    let named = |wanted: &str| picture.planes.iter().find(|(name, _)| name.rsplit('.').next() == Some(wanted));
-    // Blender's depth pass is called `Depth.V` when it has a file of its own.
-    let only = || if picture.planes.len() == 1 { picture.planes.first() } else { None };
-    let Some((_, plane)) = named("Z").or_else(|| named("V")).or_else(only) else {
-        return Err(failure(path, format!("has no channel Z, but {}", list(&picture.planes))));
-    };
-    Ok((picture.size_px, plane.iter().map(|&z| f64::from(z)).collect()))
 }
 
 fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use camsim_core::{frame::RenderedFrame, scenario::OutputEncoding, scene::linear_from_srgb};
+use camsim_core::{frame::RenderedFrame, scenario::OutputEncoding, scene::linear_from_srgb, temporal::displacement::Twist};
 
 use super::*;
 use crate::write::write_picture;
@@ -150,4 +150,31 @@ fn bad_frames_are_named_by_key_and_file() {
     let (folder, path) = folder(&GOOD.replace("c.png", "big.png"));
     image::RgbImage::new(4, 2).save(folder.path().join("big.png")).unwrap();
     assert!(read_frame(&path).unwrap_err().to_string().contains("d.png: is 3x2, but the colour is 4x2"));
+}
+
+#[test]
+fn marked_holes_are_those_of_the_depth_picture() {
+    let file = read(&format!("{GOOD}holes = \"mark\"\n")).unwrap();
+    assert_eq!(file.frame.holes, [false, false, true, false, false, false]);
+    assert!(read(GOOD).unwrap().frame.holes.is_empty() && (file.without_depth - 1.0 / 6.0).abs() < 1e-12);
+    let nearest = read(&format!("{GOOD}holes = \"nearest\"\n")).unwrap();
+    assert_eq!(nearest.frame.inverse_depth[2], (1.0_f64 / 65.535) as f32, "of 0.5 m and 65.535 m the farther");
+    // Without depth at all the camera only turns, and nothing is missing.
+    assert!(read("color = \"c.png\"\nfocal_px = [2, 2]\nholes = \"mark\"\n").unwrap().frame.holes.is_empty());
+}
+
+#[test]
+fn packed_depth_must_be_lossless() {
+    let (folder, path) = folder("color = \"c.png\"\ndepth = \"p.jpg\"\ndepth_encoding = \"packed24\"\nfocal_px = [2, 2]\n");
+    let packed = image::RgbImage::from_pixel(3, 2, image::Rgb([0, 2, 51]));
+    packed.save(folder.path().join("p.jpg")).unwrap();
+    let error = read_frame(&path).unwrap_err().to_string();
+    assert!(error.contains("p.jpg: is not lossless"), "{error}");
+    // The name does not decide: a JPEG called PNG is one.
+    fs::rename(folder.path().join("p.jpg"), folder.path().join("p.png")).unwrap();
+    fs::write(&path, fs::read_to_string(&path).unwrap().replace("p.jpg", "p.png")).unwrap();
+    assert!(read_frame(&path).unwrap_err().to_string().contains("is not lossless"));
+    packed.save(folder.path().join("p.bmp")).unwrap();
+    fs::write(&path, fs::read_to_string(&path).unwrap().replace("p.png", "p.bmp")).unwrap();
+    assert!((f64::from(read_frame(&path).unwrap().frame.inverse_depth[0]) * 2.2 - 1.0).abs() < 1e-6);
 }

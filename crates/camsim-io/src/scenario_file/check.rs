@@ -91,6 +91,8 @@ fn expected(schema: &Schema, key: &str, kind: Kind, value: &Value) -> Option<Str
         Kind::Counts(n, most) => (all(value, Some(n), &count), format!("a list of {n} whole numbers up to {most}")),
         Kind::NumberList => (all(value, None, &number), "a list of numbers".to_owned()),
         Kind::Path => (false, "a path in quotes".to_owned()),
+        Kind::Text => (value.is_str(), "a text in quotes".to_owned()),
+        Kind::Texts => (all(value, None, &Value::is_str), "a list of texts in quotes".to_owned()),
         Kind::Tables => (false, format!("a list of tables; write [[{key}]]")),
         Kind::Word(words) => (among(value, words), format!("one of {}", list(words))),
         Kind::Words(words) => (all(value, None, &|value| among(value, words)), format!("a list of any of {}", list(words))),

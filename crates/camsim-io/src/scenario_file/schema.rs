@@ -49,6 +49,10 @@ pub enum Kind {
     Path,
     /// One of these words.
     Word(&'static [&'static str]),
+    /// Any text.
+    Text,
+    /// A list of texts.
+    Texts,
     /// A list of these words.
     Words(&'static [&'static str]),
     /// An array of tables, whose keys stand under the same dotted name.

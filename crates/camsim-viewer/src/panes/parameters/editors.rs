@@ -33,7 +33,8 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Par
         Kind::Flag => flag(ui, key, value),
         Kind::Word(words) => word(ui, key, value, words),
         Kind::Words(words) => several(ui, key, value, words),
-        Kind::Tables | Kind::Later => None,
+        // Texts are of FRAME.toml alone.
+        Kind::Tables | Kind::Later | Kind::Text | Kind::Texts => None,
     };
     if let Some(Edit { value, ongoing }) = edit {
         out.push(Message::Set(key.to_owned(), value, ongoing));

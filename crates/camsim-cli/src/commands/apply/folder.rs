@@ -1,0 +1,245 @@
+//! `camsim apply` on many frames: one after the other, into a folder.
+
+use std::collections::BTreeMap;
+
+use anyhow::anyhow;
+use camsim_core::{
+    apply::{Pipeline, UnseenCounts},
+    scenario::{CameraSpec, Channel, ImageFormat, OutputSpec},
+    sequence::GrayImage,
+    shutter::Shutter,
+};
+use camsim_io::{
+    frame_file::FrameSet,
+    manifest::{ResumeError, check_resume_of},
+    write::{FrameFiles, FrameWriter, camera_toml, write_atomic},
+};
+use serde::Serialize;
+
+use super::{Args, in_file, read, settings, tell_unseen};
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+    frame_list::FrameListError,
+    output,
+    progress::frames_bar,
+};
+
+/// `--format`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// OpenEXR, linear
+    Exr,
+    /// PNG in the encoding of photometric.output
+    Png,
+}
+
+/// What the frames of a folder follow from; `--resume` goes on only with the same.
+#[derive(Debug, Serialize)]
+struct Inputs<'a> {
+    camera: &'a CameraSpec,
+    /// FRAME.toml, as it is written.
+    frame_toml: String,
+    preset: String,
+    solver: Option<String>,
+    blur_samples: Option<u32>,
+    seed: u64,
+    frame_number: u64,
+    /// Pictures and stamp of each frame.
+    pictures: BTreeMap<String, String>,
+}
+
+/// `run.json`.
+#[derive(Debug, Serialize)]
+struct Manifest<'a> {
+    version: &'static str,
+    apply: &'a Inputs<'a>,
+    /// First and one past the last.
+    frames: [u64; 2],
+    written: u64,
+    skipped: u64,
+    finished: bool,
+}
+
+/// All frames that are asked for; nothing is written before all of them are known to have their motion.
+pub(super) fn run(
+    args: &Args,
+    spec: &CameraSpec,
+    set: &FrameSet,
+    vignette: Option<&GrayImage>,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    let folder = &args.output;
+    if super::ends_as_picture(args) {
+        let (frame, count) = (args.frame.display(), set.entries().len());
+        return Err(Failure::bad_input(anyhow!("-o {}: {frame} names {count} frames, so it must be a folder", folder.display())));
+    }
+    let frames = chosen(args, set)?;
+    check_motion(args, spec, set, &frames)?;
+    let inputs = inputs(args, spec, set)?;
+    match check_resume_of(folder, "apply", &inputs) {
+        Err(error) if args.resume => return Err(Failure::bad_input(error)),
+        Err(ResumeError::Differs { path, .. } | ResumeError::Parse { path, .. }) => {
+            console.warn(format_args!("{} is of other inputs: files of the same name are replaced, others stay", path.display()));
+        }
+        _ => {}
+    }
+    output::check_folder(folder)?;
+    let files = FrameFiles::new(folder, &output_spec(args, set), spec.photometric.output);
+    let number = |index: u64| args.frame_number.saturating_add(index);
+    let todo: Vec<u64> = frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
+    let mut manifest = Manifest {
+        version: env!("CARGO_PKG_VERSION"),
+        apply: &inputs,
+        frames: [frames.first().copied().unwrap_or(0), frames.last().map_or(0, |last| last + 1)],
+        written: 0,
+        skipped: (frames.len() - todo.len()) as u64,
+        finished: false,
+    };
+    write_manifest(args, &manifest)?;
+    write_atomic(&folder.join("camera.toml"), camera_toml(spec).or_failed()?.as_bytes()).or_failed()?;
+    // A resumed folder may hold frames beyond those asked for now.
+    let kept = |index: &u64| frames.binary_search(index).is_ok() || (args.resume && files.exist(number(*index)));
+    let kept: Vec<u64> = (0..set.entries().len() as u64).filter(kept).collect();
+    write_atomic(&folder.join("frames.csv"), &frames_csv(args, set, &files, &kept)?).or_failed()?;
+
+    let begin = std::time::Instant::now();
+    let unseen = render(args, spec, set, vignette, &todo, files, console)?;
+    manifest.written = todo.len() as u64;
+    manifest.finished = true;
+    write_manifest(args, &manifest)?;
+    let (elapsed_s, skipped) = (begin.elapsed().as_secs_f64(), manifest.skipped);
+    let skipped = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
+    console.note(format_args!("{} frames{skipped} in {elapsed_s:.2} s in {}", todo.len(), folder.display()));
+    if set.left_out() > 0 {
+        console.warn(format_args!("{} colour pictures have no depth of about their time, and are left out", set.left_out()));
+    }
+    let pixels = f64::from(spec.size_px[0]) * f64::from(spec.size_px[1]) * todo.len() as f64;
+    tell_unseen(&unseen, pixels, console);
+    Ok(())
+}
+
+fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
+    let count = set.entries().len() as u64;
+    let Some(list) = &args.frames else { return Ok((0..count).collect()) };
+    list.resolve(count).map_err(|error| match error {
+        FrameListError::Outside { frame, .. } => {
+            Failure::bad_input(anyhow!("--frames asks for frame {frame}, but {} names frames 0 to {}", args.frame.display(), count - 1))
+        }
+        error => Failure::bad_input(error),
+    })
+}
+
+/// Every frame's window must be within the trajectory.
+fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
+    let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| in_file(args, &error.into())).or_bad_input()?;
+    let (first_s, last_s) = shutter.window_s();
+    let [first_s, last_s] = [first_s.min(set.instant_s()), last_s.max(set.instant_s())];
+    let mut covered = Vec::new();
+    let mut missing = None;
+    for &frame in frames {
+        match set.motion(frame as usize).or_bad_input()?.covers(first_s, last_s) {
+            Ok(()) => covered.push(frame),
+            Err(error) => missing = missing.or(Some((frame, error))),
+        }
+    }
+    let Some((frame, error)) = missing else { return Ok(()) };
+    let covers = match (covered.first(), covered.last()) {
+        (Some(first), Some(last)) => format!("it covers --frames {first}..={last}"),
+        _ => "it covers none of the frames; both must be on one clock".to_owned(),
+    };
+    let bad = frames.len() - covered.len();
+    let frames = frames.len();
+    Err(Failure::bad_input(anyhow!("{}: {bad} of {frames} frames, first frame {frame}: {error}; {covers}", args.frame.display())))
+}
+
+fn inputs<'a>(args: &Args, spec: &'a CameraSpec, set: &FrameSet) -> Result<Inputs<'a>, Failure> {
+    let text = |path: &std::path::Path| path.display().to_string();
+    let picture = |entry: &camsim_io::frame_file::list::Entry| {
+        let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
+        format!("{}, {}, {stamp}", text(&entry.color), entry.depth.as_deref().map_or("no depth".to_owned(), text))
+    };
+    Ok(Inputs {
+        camera: spec,
+        frame_toml: std::fs::read_to_string(&args.frame).or_bad_input()?,
+        preset: format!("{:?}", args.preset).to_lowercase(),
+        solver: args.solver.map(|solver| format!("{solver:?}").to_lowercase()),
+        blur_samples: args.blur_samples,
+        seed: args.seed,
+        frame_number: args.frame_number,
+        pictures: set.entries().iter().enumerate().map(|(index, entry)| (format!("{index:06}"), picture(entry))).collect(),
+    })
+}
+
+fn output_spec(args: &Args, set: &FrameSet) -> OutputSpec {
+    let mut format = Vec::new();
+    for wanted in &args.format {
+        let image = match wanted {
+            Format::Exr => ImageFormat::Exr,
+            Format::Png => ImageFormat::Png,
+        };
+        if !format.contains(&image) {
+            format.push(image);
+        }
+    }
+    if format.is_empty() {
+        format.push(ImageFormat::Exr);
+    }
+    let has_depth = set.entries().iter().any(|entry| entry.depth.is_some());
+    let depth = has_depth.then_some(Channel::Depth);
+    OutputSpec { channels: [Channel::Color, Channel::Valid].into_iter().chain(depth).collect(), format, ..OutputSpec::default() }
+}
+
+fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(manifest).or_failed()? + "\n";
+    write_atomic(&args.output.join("run.json"), text.as_bytes()).or_failed()
+}
+
+/// `frame,stamp_ns,from_color,from_depth`, then the files of each frame; what there is none of is empty.
+fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -> Result<Vec<u8>, Failure> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for (i, &index) in frames.iter().enumerate() {
+        let Some(entry) = set.entries().get(index as usize) else { continue };
+        let number = args.frame_number.saturating_add(index);
+        let names = files.names(number);
+        if i == 0 {
+            let columns = ["frame", "stamp_ns", "from_color", "from_depth"];
+            writer.write_record(columns.into_iter().chain(names.iter().map(|(column, _)| column.as_str()))).or_failed()?;
+        }
+        let own = [
+            number.to_string(),
+            entry.stamp_ns.map(|stamp_ns| stamp_ns.to_string()).unwrap_or_default(),
+            entry.color.display().to_string(),
+            entry.depth.as_deref().map(|depth| depth.display().to_string()).unwrap_or_default(),
+        ];
+        writer.write_record(own.into_iter().chain(names.into_iter().map(|(_, name)| name))).or_failed()?;
+    }
+    writer.into_inner().map_err(|error| anyhow!("frames.csv: {error}")).or_failed()
+}
+
+fn render(
+    args: &Args,
+    spec: &CameraSpec,
+    set: &FrameSet,
+    vignette: Option<&GrayImage>,
+    todo: &[u64],
+    files: FrameFiles,
+    console: &mut Console<'_>,
+) -> Result<UnseenCounts, Failure> {
+    // A frame is rendered on all cores; one thread beside them writes.
+    let writer = FrameWriter::new(files, 1);
+    let bar = frames_bar(todo.len() as u64, console.is_quiet());
+    let mut unseen = UnseenCounts::default();
+    for &index in todo {
+        let file = read(args, set, index as usize, console)?;
+        let settings = settings(args, &file, index);
+        let pipeline = Pipeline::new(spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
+        let (picture, counts) = pipeline.render_and_count(vignette);
+        unseen += counts;
+        writer.write(picture).or_failed()?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    writer.finish().or_failed()?;
+    Ok(unseen)
+}

@@ -1,0 +1,151 @@
+//! The frames of a FRAME.toml, one or many, and the motion of each.
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    apply::{Motion, PoseRow, PoseTrack},
+    temporal::displacement::Twist,
+};
+use glam::DVec3;
+
+use super::{
+    FrameFile, FrameFileError, FrameSpec,
+    list::{Entry, frames},
+    poses::read_poses,
+    read_pictures, read_spec,
+};
+
+/// Frames that are read one by one.
+#[derive(Clone, Debug)]
+pub struct FrameSet {
+    path: PathBuf,
+    spec: FrameSpec,
+    entries: Vec<Entry>,
+    left_out: usize,
+    several: bool,
+    moves: Moves,
+}
+
+#[derive(Clone, Debug)]
+enum Moves {
+    Twist(Twist),
+    /// Rows with times from `base_s`.
+    Poses {
+        table: PathBuf,
+        rows: Vec<PoseRow>,
+        base_s: f64,
+    },
+}
+
+/// Reads a frame file and the tables that it names; its pictures are read by [`FrameSet::read`].
+///
+/// # Errors
+/// [`FrameFileError`] names the file, the line or key where there is one, and what to do.
+pub fn read_frame_set(path: &Path) -> Result<FrameSet, FrameFileError> {
+    let spec = read_spec(path)?;
+    let listed = frames(&spec, path)?;
+    let moves = read_moves(&spec, &listed.entries, listed.several, path)?;
+    Ok(FrameSet { path: path.into(), entries: listed.entries, left_out: listed.left_out, several: listed.several, spec, moves })
+}
+
+impl FrameSet {
+    /// The frames in order; there is at least one.
+    #[must_use]
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Colour pictures without depth of about the same time, which are none of the frames.
+    #[must_use]
+    pub fn left_out(&self) -> usize {
+        self.left_out
+    }
+
+    /// When the pictures were taken, seconds from their stamps.
+    #[must_use]
+    pub fn instant_s(&self) -> f64 {
+        1e-3 * self.spec.instant_ms
+    }
+
+    /// Whether the file names a folder or a table of frames, which may hold a single one.
+    #[must_use]
+    pub fn is_several(&self) -> bool {
+        self.several
+    }
+
+    /// How the camera moves about the stamp of frame `index`.
+    ///
+    /// # Errors
+    /// No such frame, or a table of poses that cannot be used.
+    pub fn motion(&self, index: usize) -> Result<Motion, FrameFileError> {
+        match &self.moves {
+            Moves::Twist(twist) => Ok(Motion::Twist(*twist)),
+            Moves::Poses { table, rows, base_s } => {
+                let stamp_s = self.stamp_s(index).unwrap_or(*base_s);
+                let track = PoseTrack::new(rows.clone(), stamp_s - base_s);
+                Ok(Motion::Poses(track.map_err(|source| FrameFileError::Track { path: table.clone(), source })?))
+            }
+        }
+    }
+
+    /// Reads the pictures of frame `index`.
+    ///
+    /// # Errors
+    /// As [`read_frame_set`], of the pictures; or no such frame.
+    pub fn read(&self, index: usize) -> Result<FrameFile, FrameFileError> {
+        let Some(entry) = self.entries.get(index) else {
+            let message = format!("has {} frames; there is none of number {index}", self.entries.len());
+            return Err(FrameFileError::Key { path: self.path.clone(), key: "frames", message });
+        };
+        read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), self.motion(index)?, &self.path)
+    }
+
+    fn stamp_s(&self, index: usize) -> Option<f64> {
+        let stamp_ns = self.entries.get(index)?.stamp_ns?;
+        Some(seconds(stamp_ns))
+    }
+}
+
+/// Whole seconds apart, so that a stamp in Unix time keeps its nanoseconds as far as an f64 does.
+fn seconds(stamp_ns: i64) -> f64 {
+    stamp_ns.div_euclid(1_000_000_000) as f64 + stamp_ns.rem_euclid(1_000_000_000) as f64 * 1e-9
+}
+
+/// A twist (nothing given is no motion) or a table of poses, not both.
+fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path) -> Result<Moves, FrameFileError> {
+    let motion = &spec.motion;
+    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    let Some(trajectory) = &motion.trajectory else {
+        if motion.stamp_s.is_some() && spec.fps.is_none() {
+            return fail("motion.stamp_s", "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out");
+        }
+        let [velocity, rate] = [motion.velocity_m_s, motion.angular_rate_rad_s].map(|v| DVec3::from_array(v.unwrap_or_default()));
+        for (key, value) in [("motion.velocity_m_s", velocity), ("motion.angular_rate_rad_s", rate)] {
+            if !value.is_finite() {
+                return fail(key, "must be three finite numbers, in camera axes: x right, y down, z forward");
+            }
+        }
+        return Ok(Moves::Twist(Twist { velocity_m_s: velocity, rate_rad_s: rate }));
+    };
+    if motion.velocity_m_s.is_some() || motion.angular_rate_rad_s.is_some() {
+        return fail("motion", "has both a twist and a trajectory; give one of them");
+    }
+    let base_s = match (several, motion.stamp_s) {
+        (false, Some(stamp_s)) => stamp_s,
+        (false, None) => return fail("motion.stamp_s", "is missing: give the stamp of the frame on the clock of motion.trajectory"),
+        (true, _) => match entries.first().and_then(|entry| entry.stamp_ns) {
+            Some(stamp_ns) => seconds(stamp_ns),
+            None => {
+                let fix = "is there, but the frames have no times: say what their names count with name_unit (\"s\", \"ms\", \"us\" or \"ns\"), \
+                           or give fps, with motion.stamp_s for the first";
+                return fail("motion.trajectory", fix);
+            }
+        },
+    };
+    if !base_s.is_finite() {
+        return fail("motion.stamp_s", "must be a finite number of seconds on the clock of motion.trajectory");
+    }
+    let rows = read_poses(trajectory, motion.trajectory_format, base_s)?;
+    let moves = Moves::Poses { table: trajectory.clone(), rows, base_s };
+    Ok(moves)
+}
