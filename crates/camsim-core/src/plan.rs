@@ -20,6 +20,7 @@ use crate::{
     temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
+mod borders;
 mod bounds;
 mod contours;
 mod describe;
