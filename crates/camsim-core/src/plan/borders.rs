@@ -20,6 +20,8 @@ pub(super) struct Crossed {
     pub borders: u32,
     /// Squared error, of the linear range, mean over the area that the lines stand for, of borders that run along whole pixels of the camera's size.
     pub stairs: f64,
+    /// The same of borders between meshes that touch, as a window and its wall do: depth tells nothing of them, so that rays leave them as they are.
+    pub flush: f64,
 }
 
 impl Search<'_> {
@@ -28,7 +30,7 @@ impl Search<'_> {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
-        let (mut borders, mut contrast2, mut depth) = (0, 0.0, 0.0);
+        let (mut borders, mut contrast2, mut flush2, mut depth) = (0, 0.0, 0.0, 0.0);
         for axis in [DVec2::X, DVec2::Y] {
             let uv = |place: f64| probe.uv + probe.uv_from_px * ((place - f64::from(NEAR_PX)) * axis);
             let meet = |place: f64| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
@@ -39,20 +41,24 @@ impl Search<'_> {
             for k in 0..PLACES - 1 {
                 let may = (k > 0 && bends(k - 1)) || (k + 2 < PLACES && bends(k));
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
+                let color = |k: usize| self.surfaces.color(met[k].as_ref(), uv(k as f64).extend(1.0).length());
+                let square = || (color(k) - color(k + 1)).length_squared() / 3.0;
+                let mesh = |k: usize| met[k].as_ref().map_or(0, |met| met.surface);
                 if may && steps(inverse_depths[k], inverse_depths[k + 1], between) {
-                    let color = |k: usize| self.surfaces.color(met[k].as_ref(), uv(k as f64).extend(1.0).length());
                     borders += 1;
-                    contrast2 += (color(k) - color(k + 1)).length_squared() / 3.0;
+                    contrast2 += square();
+                } else if mesh(k) != mesh(k + 1) && mesh(k) * mesh(k + 1) > 0 {
+                    flush2 += square();
                 }
             }
         }
-        if borders == 0 {
+        if borders == 0 && flush2 == 0.0 {
             return Crossed::default();
         }
         let path_px = path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, depth, self.reach.camera.focal_px).1;
         let looked_at_px = 2.0 * (PLACES - 1) as f64;
-        let length_by_contrast2 = FRAC_PI_2 * contrast2 / looked_at_px * (self.gain)(probe.pixel).powi(2);
-        Crossed { borders, stairs: stairs(length_by_contrast2, path_px) }
+        let of = |contrast2: f64| stairs(FRAC_PI_2 * contrast2 / looked_at_px * (self.gain)(probe.pixel).powi(2), path_px);
+        Crossed { borders, stairs: of(contrast2), flush: of(flush2) }
     }
 }
 

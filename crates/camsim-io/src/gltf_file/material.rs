@@ -58,7 +58,8 @@ impl<'a> Materials<'a> {
         let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
         let emits = emitted.iter().any(|&part| part > 0.0);
         let black = factor[..3].iter().all(|&part| part == 0.0);
-        let mut rule = UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true, loses_colors: false };
+        let mut rule =
+            UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true, loses_colors: false };
         let mut emissive = [0.0; 3];
         let mut on_top = None;
         let info = match (base.base_color_texture(), material.emissive_texture()) {
