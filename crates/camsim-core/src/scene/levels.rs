@@ -143,8 +143,7 @@ impl LevelTolerance {
         let ahead = pose.ned_from_camera * DVec3::Z;
         let half = 0.5 * (bounds.max - bounds.min);
         let z_m = ahead.dot(bounds.centre() - pose.position_ned_m) - half.dot(ahead.abs()) - self.travel_m;
-        // Not for a NaN.
-        if !(z_m > 0.0) {
+        if z_m.is_nan() || z_m <= 0.0 {
             return 0.0;
         }
         let [u_min, u_max, v_min, v_max] = self.tangents;

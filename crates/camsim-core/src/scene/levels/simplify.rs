@@ -121,10 +121,10 @@ impl Simplifier {
                 return;
             }
             self.queue.pop();
-            if self.changes[next.from as usize] == next.changes {
-                if let Some(collapse) = self.collapse(next.from, next.to) {
-                    self.apply(next.from, next.to, collapse);
-                }
+            if self.changes[next.from as usize] == next.changes
+                && let Some(collapse) = self.collapse(next.from, next.to)
+            {
+                self.apply(next.from, next.to, collapse);
             }
         }
     }
