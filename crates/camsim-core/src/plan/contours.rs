@@ -123,15 +123,15 @@ impl Outlook {
         let share = near as f64 / around.len().max(1) as f64;
         let contrast2 = mean(&|contour| contour.contrast2);
         // Few lines cross a border: where borders stand apart, what the wider look finds is surer.
-        let over_all =
-            |of: &dyn Fn(&Crossed) -> f64| around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64;
-        let stairs = (share * mean(&Contour::stairs)).max(SAFETY * SAFETY * over_all(&|crossed| crossed.stairs));
+        let over_all = |of: &dyn Fn(&Crossed) -> f64| {
+            SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
+        };
+        let stairs = (share * mean(&Contour::stairs)).max(over_all(&|crossed| crossed.stairs));
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
             squares: [stairs, STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip)],
-            // What rays leave is less than what is expected here; together they are enough.
             flush: over_all(&|crossed| crossed.flush),
         }
     }
@@ -321,7 +321,7 @@ mod tests {
             Mesh::new(vertices, indices, plain(byte), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp)
         };
         let found = outlook_on(vec![stripes(255, 0), stripes(0, 1)], 0.0, 1.0, Holes::default());
-        let expected = 1.0 / 4.0 / 12.0;
+        let expected = SAFETY * SAFETY / 4.0 / 12.0;
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.squares[0], 0.0);
         let [plain, rays] = [found.plain(2.0), found.with_rays(2.0, 2)].map(|of| of.error_dn);
