@@ -5,10 +5,9 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::Planner,
     reference::{Oracle, RenderOptions},
     scenario::{Channel, MountSpec},
-    scene::{Encoding, Mesh, MeshVertex, ModelDetail, Scene, SceneLevels, Texture, Wrap},
+    scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
 };
 use common::{engine, render, scenario, sequence, steady};
 use glam::{DMat3, DVec3};
@@ -107,48 +106,6 @@ fn one_side_and_holes() {
     assert!(psnr_db > 50.0, "{psnr_db}");
     let (psnr_db, seen) = compare("holes before the sky", vec![holes]);
     assert!(psnr_db > 50.0 && (0.1..0.3).contains(&seen), "{psnr_db} {seen}");
-}
-
-/// A ball of 2 n^2 triangles with a picture around it, its radius 1 m.
-fn ball(n: u32) -> Mesh {
-    let at = |i: u32, j: u32| {
-        let [u, v] = [i % n, j].map(|k| k as f32 / n as f32);
-        let ((sin, cos), (ring, down)) = ((std::f32::consts::TAU * u).sin_cos(), (std::f32::consts::PI * v).sin_cos());
-        let ring = if j == n { 0.0 } else { ring };
-        MeshVertex::new([ring * cos, ring * sin, down], [i as f32 / n as f32, v])
-    };
-    let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
-    let index = |i: u32, j: u32| j * (n + 1) + i;
-    let cell = |i: u32, j: u32| [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j), index(i + 1, j + 1), index(i, j + 1)];
-    let indices = (0..n).flat_map(|j| (0..n).flat_map(move |i| cell(i, j))).collect();
-    Mesh::new(vertices, indices, Arc::new(picture(64)), DVec3::ZERO, Wrap::Repeat)
-}
-
-#[test]
-#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn small_ones_have_fewer_triangles_and_look_the_same() {
-    let one = ball(64);
-    let place = |k: u32| {
-        let part = |step: f64| (f64::from(k) * step).fract() - 0.5;
-        Mesh {
-            origin_ned_m: DVec3::new(60.0 * part(0.618_034), 80.0 * part(0.754_878), 20.0 * part(0.569_84)),
-            ned_from_shape: DMat3::from_rotation_x(7.0 * part(0.31)) * (0.5 + part(0.83).abs()),
-            ..one.clone()
-        }
-    };
-    let scene = Scene { meshes: (0..60).map(place).collect(), ..Scene::default() };
-    let (psnr_db, seen) = compare("60 balls", scene.meshes.clone());
-    assert!(psnr_db > 42.0 && seen > 0.01, "{psnr_db} {seen}");
-    let mut scenario = scenario();
-    scenario.camera.size_px = [160, 120];
-    scenario.camera.focal_px = [200.0, 200.0];
-    scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
-    let sequence = sequence(scenario, steady(HEIGHT_M, 0.0, DVec3::ZERO, DVec3::ZERO), scene);
-    let plan = Planner::new(sequence.clone(), &[Channel::Color], 8192).expect("a planner").plan(0).expect("a plan");
-    let tolerance = plan.model_tolerance(&sequence.scenario.quality);
-    let drawn = ModelDetail::new(&sequence.scene, &SceneLevels::new(&sequence.scene), &plan.ideal_pose(), &tolerance);
-    eprintln!("{drawn:?}");
-    assert!(2 * drawn.triangles < drawn.finest_triangles, "{drawn:?}");
 }
 
 #[test]
