@@ -13,12 +13,14 @@ use crate::{
     frame::RowRecord,
     mount::CameraPath,
     pose::CameraPose,
-    scenario::{Channel, Preset},
+    scenario::{Channel, Preset, QualitySpec},
+    scene::LevelTolerance,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter},
     temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
+mod borders;
 mod bounds;
 mod contours;
 mod describe;
@@ -66,6 +68,10 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
+/// Part of the terrain's level of detail that models get: they are borders all over, of other colours than what is behind them.
+const MODEL_SHARE: f64 = 0.25;
+/// Part of `quality.max_error_px` that their displacement may take by parallax.
+const MODEL_PARALLAX_SHARE: f64 = 0.1;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
 
@@ -170,6 +176,18 @@ impl FramePlan {
     #[must_use]
     pub fn ideal_pose(&self) -> CameraPose {
         self.keys.get(self.keys.len() / 2).map_or(self.key_pose, |key| key.pose)
+    }
+
+    /// How far the surfaces of models may be from where they are, in the ideal frames: frames that share one agree on it.
+    #[must_use]
+    pub fn model_tolerance(&self, quality: &QualitySpec) -> LevelTolerance {
+        LevelTolerance {
+            focal_px: self.ideal.focal_px.max_element(),
+            tangents: self.tangents(),
+            error_px: MODEL_SHARE * self.terrain_error_px,
+            travel_m: self.motion.travel_m,
+            parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
+        }
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.

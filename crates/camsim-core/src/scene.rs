@@ -7,12 +7,14 @@ use crate::pose::CameraPose;
 
 pub mod board;
 pub(crate) mod box_tree;
+pub mod levels;
 pub mod mesh;
 pub mod picture_tiles;
 pub mod terrain;
 pub mod texture;
 
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
+pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
 pub use terrain::{

@@ -25,7 +25,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
     pose::CameraPose,
     scenario::Channel,
-    scene::LodSelection,
+    scene::{LevelTolerance, LodSelection},
     sequence::Sequence,
     temporal::IdealGeometry,
 };
@@ -154,6 +154,7 @@ struct Drawn {
     ideal: IdealGeometry,
     edges: EdgeStage,
     terrain_error_px: f64,
+    models: LevelTolerance,
     surface_reads: SurfaceReads,
     target: usize,
     /// The slot of its frame.
@@ -333,11 +334,13 @@ impl Session<'_> {
     fn ideal(&mut self, recorder: &mut Recorder<'_>, prepared: &Prepared, slot: usize) -> Result<(), RenderErrorBase> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
+        let models = plan.model_tolerance(&self.planner.sequence().scenario.quality);
         if self.drawn.as_ref().is_some_and(|drawn| {
             drawn.poses == poses
                 && drawn.ideal == plan.ideal
                 && drawn.edges == plan.edges
                 && drawn.terrain_error_px == plan.terrain_error_px
+                && drawn.models == models
                 && drawn.surface_reads == plan.surface_reads
         }) {
             return Ok(());
@@ -377,6 +380,7 @@ impl Session<'_> {
             &self.buffers,
             plan,
             &prepared.meshes,
+            &models,
             &self.targets[target].ideal,
         )?;
         self.drawn = Some(Drawn {
@@ -384,6 +388,7 @@ impl Session<'_> {
             ideal: plan.ideal,
             edges: plan.edges,
             terrain_error_px: plan.terrain_error_px,
+            models,
             surface_reads: plan.surface_reads,
             target,
             slot,

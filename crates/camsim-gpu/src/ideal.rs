@@ -6,7 +6,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LodSelection, PlacedMesh, Scene},
+    scene::{LevelTolerance, LodSelection, PlacedMesh, Scene},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
@@ -178,9 +178,9 @@ pub struct IdealSlot {
     placements: wgpu::Buffer,
     camera_group: wgpu::BindGroup,
     placement_group: wgpu::BindGroup,
-    /// By batch: what is on it, and which placements are drawn.
+    /// By batch: what is on it, and which placements are drawn with each of its levels of detail.
     mesh_groups: Vec<wgpu::BindGroup>,
-    drawn: Vec<Range<u32>>,
+    drawn: Vec<Vec<Range<u32>>>,
 }
 
 impl IdealSlot {
@@ -303,6 +303,7 @@ impl IdealPass {
         buffers: &SceneBuffers,
         plan: &FramePlan,
         meshes: &[PlacedMesh],
+        tolerance: &LevelTolerance,
         target: &IdealTarget,
     ) -> Result<LodSelection, RenderErrorBase> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
@@ -330,7 +331,7 @@ impl IdealPass {
                 lod = mesh.lod;
             }
             index_counts.push(indices);
-            place_meshes(recorder, slot, buffers, &key.pose, plan.ideal.tangents(), base_ned_m);
+            place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }

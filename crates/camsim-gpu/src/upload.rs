@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
-use camsim_core::scene::{Aabb, Encoding, Mesh, Scene, Shape, Terrain, Texture, Wrap, is_whole};
+use camsim_core::scene::{Aabb, Encoding, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::stretch};
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
 
@@ -48,10 +48,12 @@ pub enum GroundPicture {
 pub struct MeshBatch {
     /// Positions, texture coordinates and tints.
     pub vertices: wgpu::Buffer,
-    /// Triangle list.
+    /// Triangle lists of all levels of detail.
     pub indices: wgpu::Buffer,
-    /// Number of indices.
-    pub count: u32,
+    /// Where in them each level is, the full shape first.
+    pub ranges: Vec<Range<u32>>,
+    /// How far each level is from the full shape.
+    pub levels: Arc<ShapeLevels>,
     /// Picture.
     pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
@@ -80,6 +82,8 @@ pub struct PlacedShape {
     pub origin_ned_m: DVec3,
     /// From the shape's axes to NED.
     pub ned_from_shape: DMat3,
+    /// How many metres one of the shape's becomes at most.
+    pub stretch: f64,
 }
 
 impl SceneBuffers {
@@ -92,7 +96,11 @@ impl SceneBuffers {
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
         let (batches, order) = upload_meshes(gpu, scene)?;
         let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
-        let placed = meshes().map(|mesh| PlacedShape { origin_ned_m: mesh.origin_ned_m, ned_from_shape: mesh.ned_from_shape }).collect();
+        let place = |mesh: &Mesh| {
+            let &Mesh { origin_ned_m, ned_from_shape, .. } = mesh;
+            PlacedShape { origin_ned_m, ned_from_shape, stretch: stretch(&ned_from_shape) }
+        };
+        let placed = meshes().map(place).collect();
         let bounds = meshes().map(Mesh::bounds).collect();
         Ok(Self { terrain, batches, placed, bounds, sampler })
     }
@@ -155,6 +163,7 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec
             }
         }
     }
+    let levels = SceneLevels::new(scene);
     let mut textures: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
     let (mut batches, mut order) = (Vec::new(), Vec::new());
     for (mesh, members) in groups {
@@ -166,14 +175,20 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec
         textures.insert(key, texture.clone());
         let first = order.len() as u32;
         order.extend(members);
-        batches.push(upload_batch(gpu, mesh, texture, first..order.len() as u32));
+        batches.push(upload_batch(gpu, mesh, levels.of(&mesh.shape), texture, first..order.len() as u32));
     }
     Ok((batches, order))
 }
 
-fn upload_batch(gpu: &GpuContext, mesh: &Mesh, texture: wgpu::TextureView, members: Range<u32>) -> MeshBatch {
+fn upload_batch(gpu: &GpuContext, mesh: &Mesh, levels: Arc<ShapeLevels>, texture: wgpu::TextureView, members: Range<u32>) -> MeshBatch {
     let (shape, material) = (&mesh.shape, &mesh.material);
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
+    let (mut indices, mut ranges) = (Vec::<u32>::new(), Vec::new());
+    for level in levels.levels() {
+        let first = indices.len() as u32;
+        indices.extend(&level.indices);
+        ranges.push(first..indices.len() as u32);
+    }
     let [r, g, b] = material.emissive;
     let uniform = [r, g, b, material.cutoff.unwrap_or(0.0)];
     let buffer = |label, contents: &[u8], usage| {
@@ -181,8 +196,9 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, texture: wgpu::TextureView, membe
     };
     MeshBatch {
         vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
-        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&shape.indices), wgpu::BufferUsages::INDEX),
-        count: shape.indices.len() as u32,
+        indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+        ranges,
+        levels,
         texture,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::cast_slice(&uniform), wgpu::BufferUsages::UNIFORM),

@@ -13,6 +13,7 @@ use camsim_core::scene::{Material, Mesh, Shape};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
+mod emitted;
 mod material;
 mod pose;
 mod primitive;
@@ -196,6 +197,9 @@ impl Reader<'_> {
             let own = joints.is_some() || primitive.morph_targets().next().is_some();
             let key = (mesh.index(), primitive.index(), mirrored);
             let (material, uv) = self.materials.of(&primitive.material())?;
+            if uv.loses_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
+                self.notes.push("vertex colours under a picture of emitted light are left out".into());
+            }
             let shape = match self.shapes.get(&key).filter(|_| !own) {
                 Some(shape) => shape.clone(),
                 None => {

@@ -3,7 +3,7 @@
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, Solver},
-    scene::{self, GroundTiles, TILE_BYTES, TerrainDetail},
+    scene::{self, GroundTiles, ModelDetail, SceneLevels, TILE_BYTES, TerrainDetail},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
@@ -43,6 +43,7 @@ struct Explained<'a> {
     warnings: &'a [String],
     plan: PlanSummary<'a>,
     level_of_detail: Option<LevelOfDetail>,
+    models: Option<Models>,
     memory: Option<Memory>,
 }
 
@@ -72,6 +73,15 @@ pub(super) struct LevelOfDetail {
     pub(super) tolerance_px: f64,
     /// What the device holds of its triangles.
     pub(super) triangle_bytes: u64,
+}
+
+/// What the ideal frame draws of models and patterns.
+#[derive(Serialize)]
+struct Models {
+    #[serde(flatten)]
+    detail: ModelDetail,
+    /// Bound on how far what is drawn is from the full models, px of the ideal frame.
+    tolerance_px: f64,
 }
 
 /// Memory for a terrain and its picture, bytes. Only what is in sight of a frame is on the device, but for a picture that is held whole.
@@ -115,12 +125,23 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let plan = planner.plan(args.frame).or_bad_input()?;
     let (log, terrain) = (log_facts(&loaded), loaded.terrain.as_ref().map(terrain_facts));
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
+    let models = models(&loaded.sequence, &plan);
     let memory = memory(&loaded.sequence, &plan);
     let tracked = &loaded.tracked;
     let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
         let warnings = &loaded.warnings;
-        return Ok(console.json(&Explained { frames, log, tracker, terrain, warnings, plan: plan.summary(), level_of_detail, memory })?);
+        return Ok(console.json(&Explained {
+            frames,
+            log,
+            tracker,
+            terrain,
+            warnings,
+            plan: plan.summary(),
+            level_of_detail,
+            models,
+            memory,
+        })?);
     }
     let [first_s, last_s] = log.span_s;
     console.line(format_args!("log {}", log.file))?;
@@ -145,7 +166,21 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             print_memory(&memory, triangle_bytes, console)?;
         }
     }
+    if let Some(Models { detail: ModelDetail { meshes, triangles, finest_triangles }, tolerance_px }) = models {
+        console.line("models in this frame")?;
+        console.line(format_args!(
+            "  {meshes} meshes of {triangles} triangles, off by at most {tolerance_px:.3} px; {finest_triangles} at the finest level"
+        ))?;
+    }
     Ok(())
+}
+
+/// As the ideal pass chooses for its middle key.
+fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
+    let scene = &sequence.scene;
+    let tolerance = plan.model_tolerance(&sequence.scenario.quality);
+    let detail = || ModelDetail::new(scene, &SceneLevels::new(scene), &plan.ideal_pose(), &tolerance);
+    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px })
 }
 
 /// The choice that the ideal pass makes.

@@ -6,13 +6,21 @@
 //! parallax is the rays around the probes tell; a few silhouettes have most of it, at which hardly any probe stands, so that the share that holes
 //! have of the picture (`holes.rs`) is asked too.
 //!
-//! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of its pixels where the border is.
+//! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of its pixels where the border is. Where
+//! meshes of other colours touch, rays change nothing: only a finer ideal frame does.
 
 use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Holes, LensReach, edges::MOST_FINE, probes::Probe, prospect::path_px, surfaces::Surfaces};
+use super::{
+    Holes, LensReach,
+    borders::{Crossed, stairs},
+    edges::MOST_FINE,
+    probes::Probe,
+    prospect::path_px,
+    surfaces::Surfaces,
+};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
@@ -67,6 +75,8 @@ pub(super) struct Search<'a> {
 /// What is seen around a probe.
 pub(super) struct Around {
     contour: Option<Contour>,
+    /// What is found pixel by pixel, where models may be thinner than the places of that look.
+    crossed: Crossed,
     /// Whether there is a step or a fold of depth.
     pub is_beside: bool,
 }
@@ -79,6 +89,8 @@ pub(super) struct Outlook {
     hidden_share: f64,
     /// Mean squared errors over the picture, of the linear range: by stairs at the camera's own scale, and by strips.
     squares: [f64; 2],
+    /// By borders between meshes that touch, at the camera's own scale.
+    flush: f64,
 }
 
 /// One probe near a silhouette.
@@ -90,14 +102,9 @@ struct Contour {
 }
 
 impl Contour {
-    /// Squared error, mean over the pixels within reach, of a border along whole pixels of the camera's size.
-    ///
-    /// Where the border truly is within such a pixel is any place alike, so that one pixel of each line across has 1/12 of the squared
-    /// contrast. The path over the exposure spreads that over its length, as many times less of the contrast in as many times more pixels;
-    /// half of that, since many paths run along the border.
+    /// Squared error, mean over the pixels within reach, of a border along whole pixels of the camera's size: of one border.
     fn stairs(&self) -> f64 {
-        let width_px = (12.0 * (1.0 + self.path_px).sqrt()).recip();
-        SAFETY * SAFETY * self.contrast2 * width_px / f64::from(2 * NEAR_PX + 1)
+        SAFETY * SAFETY * stairs(self.contrast2 / f64::from(2 * NEAR_PX + 1), self.path_px)
     }
 
     /// The same of the strip within parallax: narrower than a pixel it is as much less of one, and the exposure spreads it over its path.
@@ -115,12 +122,17 @@ impl Outlook {
         let mean = |of: &dyn Fn(&Contour) -> f64| found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
         let share = near as f64 / around.len().max(1) as f64;
         let contrast2 = mean(&|contour| contour.contrast2);
-        let stairs = share * mean(&Contour::stairs);
+        // Few lines cross a border: where borders stand apart, what the wider look finds is surer.
+        let over_all = |of: &dyn Fn(&Crossed) -> f64| {
+            SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
+        };
+        let stairs = (share * mean(&Contour::stairs)).max(over_all(&|crossed| crossed.stairs));
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
             squares: [stairs, STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip)],
+            flush: over_all(&|crossed| crossed.flush),
         }
     }
 
@@ -133,12 +145,12 @@ impl Outlook {
 
     /// Left as they are, with so many ideal pixels for each of the camera's.
     pub fn plain(&self, scale: f64) -> Contours {
-        self.of(self.squares[0] / (scale * scale) + self.squares[1])
+        self.of((self.squares[0] + self.flush) / (scale * scale) + self.squares[1])
     }
 
     /// With rays of their own: a border is known to a part of a fine pixel.
     pub fn with_rays(&self, scale: f64, fine: u32) -> Contours {
-        self.of(RAYS_LEAVE * self.squares[0] / (scale * f64::from(fine)).powi(2))
+        self.of(RAYS_LEAVE * self.squares[0] / (scale * f64::from(fine)).powi(2) + self.flush / (scale * scale))
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -201,7 +213,8 @@ impl Search<'_> {
             contrast2: (self.gain)(probe.pixel).powi(2) * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], self.reach.camera.focal_px).1,
         });
-        Around { is_beside: contour.is_some() || LINES.iter().any(is_fold), contour }
+        let crossed = if self.surfaces.has_models() { self.crossed(probe) } else { Crossed::default() };
+        Around { is_beside: contour.is_some() || crossed.borders > 0 || LINES.iter().any(is_fold), contour, crossed }
     }
 }
 
@@ -218,7 +231,7 @@ mod tests {
         camera::CameraModel,
         pose::BodyState,
         scenario::{LensModel, MountSpec, ShutterSpec},
-        scene::{Encoding, Mesh, Scene, Texture},
+        scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
         trajectory::Trajectory,
     };
 
@@ -227,9 +240,17 @@ mod tests {
 
     /// A white roof of 50 m, 50 m above black ground, from 100 m above it, flying east with a readout of 100 ms.
     fn outlook(exposure_ms: f64, gain: f64, holes: Holes) -> Outlook {
-        let of = |byte: u8| Arc::new(Texture::uniform([byte, byte, byte, 255], Encoding::Linear));
-        let roof = Mesh::level_picture(of(255), DVec3::new(0.0, 0.0, -50.0), 50.0);
-        let scene = Scene { meshes: vec![Mesh::level_picture(of(0), DVec3::ZERO, 5000.0), roof], ..Scene::default() };
+        outlook_on(vec![Mesh::level_picture(plain(255), DVec3::new(0.0, 0.0, -50.0), 50.0)], exposure_ms, gain, holes)
+    }
+
+    fn plain(byte: u8) -> Arc<Texture> {
+        Arc::new(Texture::uniform([byte, byte, byte, 255], Encoding::Linear))
+    }
+
+    /// The same with something else above black ground.
+    fn outlook_on(others: Vec<Mesh>, exposure_ms: f64, gain: f64, holes: Holes) -> Outlook {
+        let meshes = [vec![Mesh::level_picture(plain(0), DVec3::ZERO, 5000.0)], others].concat();
+        let scene = Scene { meshes, ..Scene::default() };
         let state = |t_s: f64| BodyState {
             position_ned_m: DVec3::new(0.0, SPEED_M_S * t_s, -150.0),
             velocity_ned_m_s: DVec3::new(0.0, SPEED_M_S, 0.0),
@@ -260,6 +281,51 @@ mod tests {
         assert!((found.contrast_dn - 255.0).abs() < 1e-3, "{found:?}");
         let half = outlook(0.0, 0.5, Holes::default()).plain(1.0);
         assert_eq!((half.contrast_dn, half.error_dn), (0.5 * found.contrast_dn, 0.5 * found.error_dn));
+    }
+
+    #[test]
+    fn borders_of_what_is_thin_are_all_counted() {
+        // White bars 1 m wide, which is 2 px, and 4 m apart, all over the picture and across its rows.
+        let (sin, cos) = 0.5_f32.sin_cos();
+        let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+        for k in -40..40 {
+            let first = vertices.len() as u32;
+            for [along, across] in [[-200.0, 0.0], [200.0, 0.0], [200.0, 1.0], [-200.0, 1.0_f32]] {
+                let across = across + 4.0 * k as f32;
+                vertices.push(MeshVertex::new([along * cos - across * sin, along * sin + across * cos, 0.0], [0.0; 2]));
+            }
+            indices.extend([0, 1, 2, 0, 2, 3].map(|corner| first + corner));
+        }
+        let comb = Mesh::new(vertices, indices, plain(255), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp);
+        let found = outlook_on(vec![comb], 0.0, 1.0, Holes::default());
+        // Two borders in 8 px, each with 1/12 of the squared contrast in one pixel across.
+        let expected = SAFETY * SAFETY * 2.0 / 8.0 / 12.0;
+        assert!((found.squares[0] / expected - 1.0).abs() < 0.1, "{} {expected}", found.squares[0]);
+        assert!(found.share > 0.99, "{}", found.share);
+        assert_eq!(found.flush, 0.0);
+    }
+
+    #[test]
+    fn meshes_that_touch_have_borders_that_rays_leave() {
+        // White and black stripes of 2 m in one plane, which are 4 px, along the rows and across them.
+        let stripes = |byte: u8, first: i32| {
+            let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+            for k in -40..40 {
+                let (at, from) = (2 * (2 * k + first), vertices.len() as u32);
+                let corner = |along: f32, across: i32| {
+                    MeshVertex::new([0.6 * along - 0.8 * across as f32, 0.8 * along + 0.6 * across as f32, 0.0], [0.0; 2])
+                };
+                vertices.extend([corner(-200.0, at), corner(200.0, at), corner(200.0, at + 2), corner(-200.0, at + 2)]);
+                indices.extend([0, 1, 2, 0, 2, 3].map(|corner| from + corner));
+            }
+            Mesh::new(vertices, indices, plain(byte), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp)
+        };
+        let found = outlook_on(vec![stripes(255, 0), stripes(0, 1)], 0.0, 1.0, Holes::default());
+        let expected = SAFETY * SAFETY / 4.0 / 12.0;
+        assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
+        assert_eq!(found.squares[0], 0.0);
+        let [plain, rays] = [found.plain(2.0), found.with_rays(2.0, 2)].map(|of| of.error_dn);
+        assert!((plain - rays).abs() < 1e-9 && (plain - 127.5 * found.flush.sqrt()).abs() < 1e-9, "{plain} {rays}");
     }
 
     #[test]

@@ -28,7 +28,8 @@ const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
-const SCALES: [f64; 6] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE];
+const SCALES: [f64; 9] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83];
+/// Beyond it only for silhouettes with rays: there more pixels, whose samples have depth alone, cost less than finer ones.
 pub(super) const MOST_SCALE: f64 = 2.0;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];

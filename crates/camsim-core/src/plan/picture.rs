@@ -3,7 +3,7 @@
 use super::{
     contours::{Contours, Outlook},
     edges,
-    levels::{Choice, NEARLY, Sampling, Task},
+    levels::{Choice, MOST_SCALE, NEARLY, Sampling, Task},
     look::{Look, Scenery},
     prospect::Prospect,
 };
@@ -40,7 +40,8 @@ impl Look<'_> {
         let Scenery { prospect, outlook, .. } = scenery;
         let given = self.common.and_then(|common| common.given);
         let Some(outlook) = outlook else {
-            let choice = given.map_or_else(|| prospect.choose(&task, &|_| Some(0.0)), |given| prospect.given(&given, &task, 0.0));
+            let usual = |scale: f64| is_usual(scale, &task).then_some(0.0);
+            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, 0.0));
             return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
         };
         let plain = || match given {
@@ -94,9 +95,17 @@ impl Look<'_> {
     }
 }
 
+/// Scales that are taken without rays; those that are asked for, or the lens needs, are.
+fn is_usual(scale: f64, task: &Task<'_>) -> bool {
+    scale <= task.least_scale.max(MOST_SCALE) || task.quality.ideal_scale.value().is_some()
+}
+
 /// Error over the picture of silhouettes that are left as they are; `None` where that is not to be.
 fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
     let plain = outlook.plain(scale);
+    if !is_usual(scale, task) {
+        return None;
+    }
     (task.quality.silhouettes == Silhouettes::Plain || plain.are_affordable(task.max_error_dn)).then_some(plain.error_dn)
 }
 
@@ -104,7 +113,8 @@ fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
 /// that these are for what the finest ideal frame does not do.
 fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
     let choose = |fine: u32| {
-        let choice = prospect.choose(task, &|scale| (fine <= most_fine(scale)).then(|| outlook.with_rays(scale, fine).error_dn));
+        let may = |scale: f64| fine <= most_fine(scale) && (fine == 1 || is_usual(scale, task));
+        let choice = prospect.choose(task, &|scale| may(scale).then(|| outlook.with_rays(scale, fine).error_dn));
         (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
     };
     let mut failed = Vec::new();

@@ -67,6 +67,11 @@ impl Surfaces {
         self.scene.terrain.as_ref()
     }
 
+    /// Whether there is anything but ground and pictures on it.
+    pub fn has_models(&self) -> bool {
+        self.scene.meshes.iter().any(|mesh| mesh.shape.indices.len() > 6)
+    }
+
     /// First surface along `origin + t direction`, t >= 0.
     pub fn meet(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
         let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));

@@ -1,8 +1,10 @@
 //! What draws a key's surfaces: where they stand is written first, once for all passes that draw them.
 
+use std::ops::Range;
+
 use camsim_core::{
     pose::CameraPose,
-    scene::{PlacedMesh, in_view},
+    scene::{LevelTolerance, PlacedMesh, in_view},
 };
 use glam::DVec3;
 
@@ -12,22 +14,30 @@ use crate::{
     layout::MeshPlacement,
     recorder::Recorder,
     tiles::TilePool,
-    upload::{GroundPicture, SceneBuffers, TerrainBuffers},
+    upload::{GroundPicture, MeshBatch, SceneBuffers, TerrainBuffers},
 };
 
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
 
-/// Writes where the meshes stand that may be in view from a key, and which of each batch they are.
+/// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how much detail.
 pub(super) fn place_meshes(
     recorder: &mut Recorder<'_>,
     slot: &mut IdealSlot,
     buffers: &SceneBuffers,
     pose: &CameraPose,
-    tangents: [f64; 4],
+    tolerance: &LevelTolerance,
     base_ned_m: DVec3,
 ) {
-    let seen = in_view(&buffers.bounds, pose, tangents);
+    let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
+    let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
+    let places: Vec<_> = buffers.batches.iter().map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end)).collect();
+    slot.drawn = buffers
+        .batches
+        .iter()
+        .zip(places)
+        .map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance))
+        .collect();
     let placement = |&i: &u32| {
         let shape = &buffers.placed[i as usize];
         let origin = (shape.origin_ned_m - base_ned_m).as_vec3();
@@ -38,14 +48,32 @@ pub(super) fn place_meshes(
     if !placements.is_empty() {
         recorder.write(&slot.placements, 0, bytemuck::cast_slice(&placements));
     }
-    let place = |member: u32| seen.partition_point(|&i| i < member) as u32;
-    slot.drawn = buffers.batches.iter().map(|batch| place(batch.members.start)..place(batch.members.end)).collect();
+}
+
+/// Sorts those of a batch that are seen by their level of detail; gives the range of each level.
+fn by_level(
+    batch: &MeshBatch,
+    buffers: &SceneBuffers,
+    seen: &mut [u32],
+    first: usize,
+    pose: &CameraPose,
+    tolerance: &LevelTolerance,
+) -> Vec<Range<u32>> {
+    let level = |&i: &u32| match batch.ranges.len() {
+        0 | 1 => 0,
+        _ => batch.levels.within(tolerance.error_m(&buffers.bounds[i as usize], pose) / buffers.placed[i as usize].stretch),
+    };
+    seen.sort_by_cached_key(level);
+    let levels: Vec<usize> = seen.iter().map(level).collect();
+    let place = |level: usize| (first + levels.partition_point(|&of| of < level)) as u32;
+    (0..batch.ranges.len()).map(|level| place(level)..place(level + 1)).collect()
 }
 
 pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, buffers: &SceneBuffers) {
     let mut last = None;
-    for ((batch, group), instances) in buffers.batches.iter().zip(&slot.mesh_groups).zip(&slot.drawn) {
-        let Some(pipeline) = pipelines.meshes.get(&batch.kind).filter(|_| !instances.is_empty()) else { continue };
+    for ((batch, group), drawn) in buffers.batches.iter().zip(&slot.mesh_groups).zip(&slot.drawn) {
+        let some = drawn.iter().any(|instances| !instances.is_empty());
+        let Some(pipeline) = pipelines.meshes.get(&batch.kind).filter(|_| some) else { continue };
         if last != Some(batch.kind) {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(2, &slot.placement_group, &[]);
@@ -54,7 +82,9 @@ pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePi
         pass.set_bind_group(1, group, &[]);
         pass.set_vertex_buffer(0, batch.vertices.slice(..));
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..batch.count, 0, instances.clone());
+        for (indices, instances) in batch.ranges.iter().zip(drawn).filter(|(_, instances)| !instances.is_empty()) {
+            pass.draw_indexed(indices.clone(), 0, instances.clone());
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use gltf::{
     texture::{Info, MagFilter, WrappingMode},
 };
 
-use super::{GltfError, source::Source};
+use super::{GltfError, emitted, source::Source};
 
 /// Where blended surfaces are cut, as blending is not there.
 const BLEND_CUTOFF: f32 = 0.5;
@@ -26,7 +26,12 @@ pub(super) struct UvRule {
     pub factor: [f32; 4],
     /// Whether vertex colours count: of what is emitted they do not.
     pub vertex_colors: bool,
+    /// Whether they should and cannot, as what is emitted is in the same picture.
+    pub loses_colors: bool,
 }
+
+/// A picture, its behaviour outside of it and whether its texels have sharp borders.
+type Textured = (Arc<Texture>, [Wrap; 2], bool);
 
 /// A file's materials and pictures, each read once.
 #[derive(Debug)]
@@ -53,8 +58,10 @@ impl<'a> Materials<'a> {
         let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
         let emits = emitted.iter().any(|&part| part > 0.0);
         let black = factor[..3].iter().all(|&part| part == 0.0);
-        let mut rule = UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true };
+        let mut rule =
+            UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true, loses_colors: false };
         let mut emissive = [0.0; 3];
+        let mut on_top = None;
         let info = match (base.base_color_texture(), material.emissive_texture()) {
             // Nothing but what is emitted.
             (_, Some(info)) if emits && black => {
@@ -67,15 +74,24 @@ impl<'a> Materials<'a> {
                     emissive = emitted;
                     if emissive_texture.is_some() {
                         emissive = [0.0; 3];
-                        self.notes.push("a picture of emitted light on top of a base colour is left out".into());
                     }
+                    on_top = emissive_texture;
                 }
                 info
             }
         };
-        let (texture, wrap, nearest) = match &info {
-            None => (self.white.clone(), [Wrap::Repeat; 2], false),
-            Some(info) => self.textured(info, material.alpha_mode() != AlphaMode::Opaque, &mut rule)?,
+        let with_light = match &on_top {
+            Some(light) => self.with_light(info.as_ref(), light, material.alpha_mode() != AlphaMode::Opaque, emitted, &mut rule)?,
+            None => None,
+        };
+        let (texture, wrap, nearest) = match (with_light, &info) {
+            (Some(both), _) => both,
+            (None, None) => {
+                // Where there is no picture its coordinates are nothing to keep.
+                rule.scale = [0.0; 2];
+                (self.white.clone(), [Wrap::Repeat; 2], false)
+            }
+            (None, Some(info)) => self.textured(info, material.alpha_mode() != AlphaMode::Opaque, &mut rule)?,
         };
         let cutoff = match material.alpha_mode() {
             AlphaMode::Opaque => None,
@@ -90,7 +106,36 @@ impl<'a> Materials<'a> {
         Ok((made, rule))
     }
 
-    fn textured(&mut self, info: &Info<'_>, has_alpha: bool, rule: &mut UvRule) -> Result<(Arc<Texture>, [Wrap; 2], bool), GltfError> {
+    /// The base colour with a picture of emitted light on top; `None`, and a note, where they do not lie on each other texel by texel.
+    fn with_light(
+        &mut self,
+        base: Option<&Info<'_>>,
+        light: &Info<'_>,
+        has_alpha: bool,
+        emitted: [f32; 3],
+        rule: &mut UvRule,
+    ) -> Result<Option<Textured>, GltfError> {
+        let mut of_light = *rule;
+        let above = self.textured(light, false, &mut of_light)?;
+        let below = match base {
+            Some(info) => self.textured(info, has_alpha, rule)?,
+            None => {
+                *rule = of_light;
+                (self.white.clone(), above.1, above.2)
+            }
+        };
+        let place = |rule: &UvRule| (rule.set, rule.offset, rule.rotation, rule.scale);
+        let [r, g, b, alpha] = rule.factor;
+        let alike = place(rule) == place(&of_light) && (above.1, above.2) == (below.1, below.2);
+        let Some(both) = emitted::on_top(&below.0, [r, g, b], &above.0, emitted).filter(|_| alike) else {
+            self.notes.push("a picture of emitted light that does not lie on its base colour texel by texel is left out".into());
+            return Ok(None);
+        };
+        *rule = UvRule { factor: [1.0, 1.0, 1.0, alpha], vertex_colors: false, loses_colors: true, ..*rule };
+        Ok(Some((Arc::new(both), below.1, below.2)))
+    }
+
+    fn textured(&mut self, info: &Info<'_>, has_alpha: bool, rule: &mut UvRule) -> Result<Textured, GltfError> {
         rule.set = info.tex_coord();
         if let Some(transform) = info.texture_transform() {
             rule.set = transform.tex_coord().unwrap_or(rule.set);

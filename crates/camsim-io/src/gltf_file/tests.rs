@@ -228,6 +228,7 @@ fn texture_coordinates_are_turned_as_their_extension_says() {
         scale,
         factor: [1.0; 4],
         vertex_colors: true,
+        loses_colors: false,
     };
     let at = |rule: material::UvRule, uv: [f64; 2]| DVec2::from_array(rule.apply(uv).map(f64::from));
     assert!(at(rule(0.0, [0.5, -0.25], [2.0, 3.0]), [0.1, 0.2]).distance(DVec2::new(0.7, 0.35)) < 1e-6);

@@ -1,0 +1,264 @@
+//! Fewer triangles for the same surface: corners are drawn into neighbours, the cheapest first.
+//!
+//! What a collapse costs is how far all corners that have gone by then are from the triangles that take their place. That steers the order alone: how far
+//! a level is from the full shape is measured afterwards (`measure.rs`).
+
+use std::{
+    cmp::Ordering,
+    collections::{BinaryHeap, HashMap},
+};
+
+use glam::DVec3;
+
+use super::space::{Point, Space, distance2};
+use crate::scene::{MeshVertex, Shape};
+
+/// Corners that have gone and are remembered by a triangle, at most: those that are farthest from it.
+const MOST_GONE: usize = 12;
+/// A triangle may turn by a collapse so far that this is left of the cosine.
+const LEAST_COSINE: f64 = 0.2;
+
+/// A shape whose triangles become fewer.
+pub(super) struct Simplifier {
+    /// By vertex of the shape.
+    pub points: Vec<Point>,
+    /// Three vertices each; of vertices that are equal the first stands for all.
+    pub triangles: Vec<[u32; 3]>,
+    alive: Vec<bool>,
+    count: usize,
+    /// Vertices at one place belong together: where attributes jump there are several.
+    place_of: Vec<u32>,
+    /// Triangles around each place, some of them gone.
+    around: Vec<Vec<u32>>,
+    /// Corners that have gone, by the triangle that took their place.
+    gone: Vec<Vec<u32>>,
+    /// Counts the changes around a place.
+    changes: Vec<u32>,
+    queue: BinaryHeap<Candidate>,
+}
+
+/// A place to be drawn into another one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    cost2: f64,
+    from: u32,
+    to: u32,
+    changes: u32,
+}
+
+impl Eq for Candidate {}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Candidate {
+    /// The cheapest is the greatest; of equals the first.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.cost2.total_cmp(&self.cost2).then_with(|| (other.from, other.to).cmp(&(self.from, self.to)))
+    }
+}
+
+/// What a collapse would do.
+struct Collapse {
+    /// Triangles that stay, as they would be.
+    kept: Vec<(u32, [u32; 3])>,
+    cost2: f64,
+}
+
+impl Simplifier {
+    pub fn new(shape: &Shape) -> Self {
+        let space = Space::of(shape);
+        let points: Vec<Point> = shape.vertices.iter().map(|vertex| space.point(vertex)).collect();
+        let (mut same, mut places) = (HashMap::new(), HashMap::new());
+        let bits = |values: &[f32]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u32>>();
+        let first: Vec<u32> = (0..)
+            .zip(&shape.vertices)
+            .map(|(i, MeshVertex { position_m, uv, tint })| *same.entry((bits(position_m), bits(uv), bits(tint))).or_insert(i))
+            .collect();
+        let place_of: Vec<u32> = (0..).zip(&shape.vertices).map(|(i, v)| *places.entry(bits(&v.position_m)).or_insert(i)).collect();
+        let triangles: Vec<[u32; 3]> = shape
+            .indices
+            .chunks_exact(3)
+            .map(|of| [0, 1, 2].map(|k| first[of[k] as usize]))
+            .filter(|of| distinct(of.map(|v| place_of[v as usize])))
+            .collect();
+        let mut around = vec![Vec::new(); points.len()];
+        for (i, of) in (0..).zip(&triangles) {
+            of.iter().for_each(|&vertex| around[place_of[vertex as usize] as usize].push(i));
+        }
+        let count = triangles.len();
+        let mut simplifier = Self {
+            alive: vec![true; count],
+            gone: vec![Vec::new(); count],
+            changes: vec![0; points.len()],
+            queue: BinaryHeap::new(),
+            points,
+            triangles,
+            count,
+            place_of,
+            around,
+        };
+        (0..simplifier.around.len() as u32).for_each(|place| simplifier.offer(place));
+        simplifier
+    }
+
+    /// The triangles that are left.
+    pub fn left(&self) -> Vec<[u32; 3]> {
+        self.triangles.iter().zip(&self.alive).filter(|(_, alive)| **alive).map(|(triangle, _)| *triangle).collect()
+    }
+
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Collapses all that costs up to `most_m`.
+    pub fn collapse_within(&mut self, most_m: f64) {
+        while let Some(&next) = self.queue.peek() {
+            if next.cost2 > most_m * most_m {
+                return;
+            }
+            self.queue.pop();
+            if self.changes[next.from as usize] == next.changes
+                && let Some(collapse) = self.collapse(next.from, next.to)
+            {
+                self.apply(next.from, next.to, collapse);
+            }
+        }
+    }
+
+    fn place(&self, vertex: u32) -> u32 {
+        self.place_of[vertex as usize]
+    }
+
+    fn star(&self, place: u32) -> impl Iterator<Item = u32> {
+        self.around[place as usize].iter().copied().filter(|&triangle| self.alive[triangle as usize])
+    }
+
+    fn neighbours(&self, place: u32) -> Vec<u32> {
+        let corners = self.star(place).flat_map(|triangle| self.triangles[triangle as usize]);
+        let mut found: Vec<u32> = corners.map(|vertex| self.place(vertex)).filter(|&other| other != place).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// Puts the cheapest collapse of a place into the queue.
+    fn offer(&mut self, from: u32) {
+        let candidates = self.neighbours(from).into_iter().filter_map(|to| {
+            let cost2 = self.collapse(from, to)?.cost2;
+            Some(Candidate { cost2, from, to, changes: self.changes[from as usize] })
+        });
+        let best = candidates.max();
+        self.queue.extend(best);
+    }
+
+    /// `None` where the surface would tear, vanish or fold.
+    fn collapse(&self, from: u32, to: u32) -> Option<Collapse> {
+        let becomes = self.partners(from, to)?;
+        let mut kept = Vec::new();
+        let mut points: Vec<u32> = becomes.iter().map(|pair| pair.0).collect();
+        for triangle in self.star(from) {
+            points.extend(&self.gone[triangle as usize]);
+            let before = self.triangles[triangle as usize];
+            if before.iter().any(|&vertex| self.place(vertex) == to) {
+                continue;
+            }
+            let after = before.map(|vertex| becomes.iter().find(|pair| pair.0 == vertex).map_or(vertex, |pair| pair.1));
+            if self.folds(before, after) {
+                return None;
+            }
+            kept.push((triangle, after));
+        }
+        if kept.is_empty() {
+            return None;
+        }
+        let from_kept2 = |&point: &u32| {
+            let of = |(_, corners): &(u32, [u32; 3])| {
+                distance2(&self.points[point as usize], corners.each_ref().map(|&v| &self.points[v as usize]))
+            };
+            kept.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        let cost2 = points.iter().map(from_kept2).fold(0.0, f64::max);
+        Some(Collapse { kept, cost2 })
+    }
+
+    /// What each vertex of a place becomes: the vertex at the other place that shares a triangle with it. `None` where that is none, or several.
+    fn partners(&self, from: u32, to: u32) -> Option<Vec<(u32, u32)>> {
+        let mut becomes: Vec<(u32, Option<u32>)> = Vec::new();
+        for triangle in self.star(from) {
+            let corners = self.triangles[triangle as usize];
+            let at = |place: u32| corners.into_iter().find(|&vertex| self.place(vertex) == place);
+            let (Some(own), partner) = (at(from), at(to)) else { continue };
+            match becomes.iter_mut().find(|pair| pair.0 == own) {
+                None => becomes.push((own, partner)),
+                Some(pair) => match (pair.1, partner) {
+                    (Some(a), Some(b)) if a != b => return None,
+                    (None, Some(_)) => pair.1 = partner,
+                    _ => {}
+                },
+            }
+        }
+        becomes.into_iter().map(|(own, partner)| partner.map(|partner| (own, partner))).collect()
+    }
+
+    fn folds(&self, before: [u32; 3], after: [u32; 3]) -> bool {
+        let normal = |of: [u32; 3]| {
+            let [a, b, c] = of.map(|vertex| {
+                let [x, y, z, ..] = self.points[vertex as usize];
+                DVec3::new(x, y, z)
+            });
+            (b - a).cross(c - a)
+        };
+        let (was, is) = (normal(before), normal(after));
+        was.dot(is) <= LEAST_COSINE * was.length() * is.length()
+    }
+
+    fn apply(&mut self, from: u32, to: u32, collapse: Collapse) {
+        let star: Vec<u32> = self.star(from).collect();
+        let mut points: Vec<u32> = star.iter().flat_map(|&triangle| std::mem::take(&mut self.gone[triangle as usize])).collect();
+        points.extend(star.iter().flat_map(|&t| self.triangles[t as usize]).filter(|&vertex| self.place(vertex) == from));
+        points.sort_unstable();
+        points.dedup();
+        let changed = self.neighbours(from);
+        for &triangle in &star {
+            self.alive[triangle as usize] = false;
+        }
+        for &(triangle, corners) in &collapse.kept {
+            self.alive[triangle as usize] = true;
+            self.triangles[triangle as usize] = corners;
+            self.around[to as usize].push(triangle);
+        }
+        self.count -= star.len() - collapse.kept.len();
+        self.around[from as usize].clear();
+        self.changes[from as usize] += 1;
+        self.remember(&points, &collapse.kept);
+        for place in changed {
+            self.changes[place as usize] += 1;
+            self.offer(place);
+        }
+    }
+
+    /// Gives each corner that has gone to the triangle that it is nearest to.
+    fn remember(&mut self, points: &[u32], kept: &[(u32, [u32; 3])]) {
+        let mut of: HashMap<u32, Vec<(f64, u32)>> = HashMap::new();
+        for &point in points {
+            let away2 = |corners: &[u32; 3]| distance2(&self.points[point as usize], corners.each_ref().map(|&v| &self.points[v as usize]));
+            let nearest = kept.iter().map(|(triangle, corners)| (away2(corners), *triangle)).min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((away2, triangle)) = nearest {
+                of.entry(triangle).or_default().push((away2, point));
+            }
+        }
+        for (triangle, mut gone) in of {
+            gone.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            gone.truncate(MOST_GONE);
+            self.gone[triangle as usize] = gone.into_iter().map(|(_, point)| point).collect();
+        }
+    }
+}
+
+fn distinct([a, b, c]: [u32; 3]) -> bool {
+    a != b && b != c && a != c
+}

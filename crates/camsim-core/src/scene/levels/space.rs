@@ -1,0 +1,111 @@
+//! Where simpler shapes are compared with the full one: a space of position, texture coordinates and colour, all in metres.
+//!
+//! A point of a surface then has a place that says what is seen there, too, and one distance bounds them all: a surface within a
+//! distance of another one has each of its colours and each place of its picture within that distance.
+
+use crate::scene::{MeshVertex, Shape};
+
+/// Position, texture coordinates, tint.
+pub(super) const AXES: usize = 9;
+
+/// A point of a surface and what is on it, metres.
+pub(super) type Point = [f64; AXES];
+
+/// How texture coordinates and colours of a shape become metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Space {
+    /// Metres of the surface for each unit of texture coordinates, as its triangles have it on average.
+    uv_m: f64,
+    /// The same for a colour's whole range: the shape's diagonal, as if colour changed evenly from one of its ends to the other.
+    tint_m: f64,
+}
+
+impl Space {
+    /// Of a shape.
+    pub fn of(shape: &Shape) -> Self {
+        let mut areas = [0.0; 2];
+        for corners in shape.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|k| shape.vertices[corners[k] as usize]);
+            let place = |vertex: MeshVertex| glam::Vec3::from(vertex.position_m).as_dvec3();
+            let uv = |vertex: MeshVertex| glam::Vec2::from(vertex.uv).as_dvec2();
+            areas[0] += (place(b) - place(a)).cross(place(c) - place(a)).length();
+            areas[1] += (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
+        }
+        let bounds = shape.bounds();
+        let diagonal_m = if bounds.is_empty() { 0.0 } else { (bounds.max - bounds.min).length() };
+        // Where the picture is spread over no area its coordinates are palette entries, and each is another colour.
+        let uv_m = if areas[1] > 1e-12 * areas[0] { (areas[0] / areas[1]).sqrt() } else { 1e3 * diagonal_m };
+        Self { uv_m, tint_m: diagonal_m }
+    }
+
+    /// A corner's.
+    pub fn point(&self, vertex: &MeshVertex) -> Point {
+        let [x, y, z] = vertex.position_m.map(f64::from);
+        let [u, v] = vertex.uv.map(|part| f64::from(part) * self.uv_m);
+        let [r, g, b, a] = vertex.tint.map(|part| f64::from(part) * self.tint_m);
+        [x, y, z, u, v, r, g, b, a]
+    }
+}
+
+pub(super) fn minus(a: &Point, b: &Point) -> Point {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+pub(super) fn dot(a: &Point, b: &Point) -> f64 {
+    (0..AXES).map(|k| a[k] * b[k]).sum()
+}
+
+pub(super) fn between(a: &Point, b: &Point) -> Point {
+    std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+}
+
+/// Squared distance of a point from a triangle, which is a convex set: of no point between three others it is more than of the farthest one.
+pub(super) fn distance2(point: &Point, [a, b, c]: [&Point; 3]) -> f64 {
+    let (e, f, v) = (minus(b, a), minus(c, a), minus(point, a));
+    let (ee, ef, ff) = (dot(&e, &e), dot(&e, &f), dot(&f, &f));
+    let (ev, fv) = (dot(&e, &v), dot(&f, &v));
+    let det = ee * ff - ef * ef;
+    if det > 1e-14 * ee * ff {
+        let (s, t) = ((ff * ev - ef * fv) / det, (ee * fv - ef * ev) / det);
+        if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+            let left: Point = std::array::from_fn(|k| v[k] - s * e[k] - t * f[k]);
+            return dot(&left, &left);
+        }
+    }
+    [(a, b), (a, c), (b, c)].into_iter().map(|(a, b)| from_segment2(point, a, b)).fold(f64::INFINITY, f64::min)
+}
+
+fn from_segment2(point: &Point, a: &Point, b: &Point) -> f64 {
+    let (along, v) = (minus(b, a), minus(point, a));
+    let length2 = dot(&along, &along);
+    let share = if length2 > 0.0 { (dot(&along, &v) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    let left: Point = std::array::from_fn(|k| v[k] - share * along[k]);
+    dot(&left, &left)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_distance_from_a_triangle_is_that_of_its_nearest_point() {
+        let part = |k: u32| f64::from(crate::noise::pcg4d([k, 3, 1, 4])[0] >> 8) / f64::from(1 << 24);
+        for k in 0..50 {
+            let point = |n: u32| -> Point { std::array::from_fn(|axis| part(100 * k + 10 * n + axis as u32)) };
+            let (p, corners) = (point(0), [point(1), point(2), point(3)]);
+            let [a, b, c] = &corners;
+            let found = distance2(&p, [a, b, c]).sqrt();
+            let steps = 200;
+            let mut nearest = f64::INFINITY;
+            for i in 0..=steps {
+                for j in 0..=steps - i {
+                    let (s, t) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+                    let left: Point = std::array::from_fn(|n| p[n] - a[n] - s * (b[n] - a[n]) - t * (c[n] - a[n]));
+                    nearest = nearest.min(dot(&left, &left).sqrt());
+                }
+            }
+            // Places of the grid are up to a step apart.
+            assert!(found <= nearest + 1e-12 && found > nearest - 0.02, "{found} {nearest}");
+        }
+    }
+}

@@ -1,0 +1,129 @@
+#![allow(clippy::unwrap_used)]
+
+use glam::{DQuat, EulerRot};
+
+use super::*;
+use crate::scene::MeshVertex;
+
+/// A sphere of 2 n^2 triangles, its picture around it, with a seam.
+fn globe(n: u32) -> Shape {
+    let at = |i: u32, j: u32| {
+        let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+        let (around, down) = (std::f64::consts::TAU * u, std::f64::consts::PI * v);
+        // The seam's two sides are at the same place, to the bit.
+        let (sin, cos) = if i == n { (0.0, 1.0) } else { around.sin_cos() };
+        let ring = if j == 0 || j == n { 0.0 } else { down.sin() };
+        MeshVertex::new([(ring * cos) as f32, (ring * sin) as f32, down.cos() as f32], [u as f32, v as f32])
+    };
+    let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
+    let index = |i: u32, j: u32| j * (n + 1) + i;
+    let cell = |i: u32, j: u32| [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j), index(i + 1, j + 1), index(i, j + 1)];
+    Shape { vertices, indices: (0..n).flat_map(|j| (0..n).flat_map(move |i| cell(i, j))).collect() }
+}
+
+/// Distance of a point of one level from another level, by a look at every triangle.
+fn away_m(shape: &Shape, corners: &[u32], point: &space::Point) -> f64 {
+    let space = space::Space::of(shape);
+    let of = |t: &[u32]| {
+        let [a, b, c] = [0, 1, 2].map(|k| space.point(&shape.vertices[t[k] as usize]));
+        space::distance2(point, [&a, &b, &c])
+    };
+    corners.chunks_exact(3).map(of).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+#[test]
+fn every_point_of_a_level_is_within_its_error() {
+    let shape = globe(24);
+    let found = ShapeLevels::new(&shape);
+    let counts: Vec<usize> = found.levels().iter().map(|level| level.indices.len() / 3).collect();
+    assert!(counts.len() >= 4 && counts.windows(2).all(|pair| pair[1] < pair[0]), "{counts:?}");
+    assert!(*counts.last().unwrap() < 100, "{counts:?}");
+    let space = space::Space::of(&shape);
+    for level in &found.levels()[1..] {
+        let mut farthest = 0.0_f64;
+        for (own, other) in [(&shape.indices, &level.indices), (&level.indices, &shape.indices)] {
+            for (k, t) in own.chunks_exact(3).enumerate() {
+                let part = |n: u32| f64::from(crate::noise::pcg4d([k as u32, n, 5, 0])[0] >> 8) / f64::from(1 << 24);
+                let (a, b) = (part(0), part(1));
+                let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b, a + b - 1.0] } else { [a, b, 1.0 - a - b] };
+                let corners = [0, 1, 2].map(|c| space.point(&shape.vertices[t[c] as usize]));
+                let point = std::array::from_fn(|axis| (0..3).map(|c| weights[c] * corners[c][axis]).sum());
+                farthest = farthest.max(away_m(&shape, other, &point));
+            }
+        }
+        assert!(farthest <= level.error_m, "{farthest} {}", level.error_m);
+        // The bound is not far from what is found at random.
+        assert!(level.error_m < 3.0 * farthest, "{farthest} {}", level.error_m);
+    }
+}
+
+#[test]
+fn flat_walls_become_few_triangles_without_error() {
+    // A box of 6 x 2 x 8 x 8 triangles, each side with corners of its own.
+    let mut shape = Shape::default();
+    for side in 0..6 {
+        let (axis, end) = (side / 2, (side % 2) as f32);
+        let first = shape.vertices.len() as u32;
+        for (i, j) in (0..9).flat_map(|j| (0..9).map(move |i| (i, j))) {
+            let mut at = [0.0; 3];
+            (at[axis], at[(axis + 1) % 3], at[(axis + 2) % 3]) = (end, i as f32 / 8.0, j as f32 / 8.0);
+            shape.vertices.push(MeshVertex::new(at, [0.0; 2]));
+        }
+        for (i, j) in (0..8).flat_map(|j| (0..8).map(move |i| (i, j))) {
+            let index = |a: u32, b: u32| first + (j + b) * 9 + i + a;
+            shape.indices.extend([index(0, 0), index(1, 0), index(1, 1), index(0, 0), index(1, 1), index(0, 1)]);
+        }
+    }
+    let found = ShapeLevels::new(&shape);
+    let level = &found.levels()[1];
+    assert_eq!(level.indices.len() / 3, 12);
+    assert!(level.error_m < 1e-6, "{}", level.error_m);
+    // Colours that differ from cell to cell are kept.
+    for (k, vertex) in shape.vertices.iter_mut().enumerate() {
+        vertex.tint = [if k % 2 == 0 { 0.0 } else { 1.0 }, 0.5, 0.5, 1.0];
+    }
+    let striped = ShapeLevels::new(&shape);
+    assert!(striped.within(0.01) == 0, "{:?}", striped.levels().iter().map(|level| level.error_m).collect::<Vec<_>>());
+}
+
+#[test]
+fn few_triangles_and_bad_indices_are_left_as_they_are() {
+    let small = globe(3);
+    assert_eq!(ShapeLevels::new(&small), ShapeLevels::full(&small));
+    let mut bad = globe(8);
+    bad.indices[7] = 1_000_000;
+    assert_eq!(ShapeLevels::new(&bad).levels().len(), 1);
+    let mut flat = globe(8);
+    flat.vertices.iter_mut().for_each(|vertex| vertex.position_m = [1.0; 3]);
+    assert_eq!(ShapeLevels::new(&flat).levels().len(), 1);
+}
+
+#[test]
+fn the_error_is_what_is_seen() {
+    let pose =
+        CameraPose { position_ned_m: DVec3::new(10.0, -20.0, -100.0), ned_from_camera: DQuat::from_euler(EulerRot::ZYX, 0.4, 0.9, -0.3) };
+    let tolerance =
+        LevelTolerance { focal_px: 400.0, tangents: [-0.8, 0.7, -0.6, 0.5], error_px: 0.1, travel_m: 0.0, parallax_px: f64::INFINITY };
+    let project = |point: DVec3| {
+        let in_camera = pose.ned_from_camera.inverse() * (point - pose.position_ned_m);
+        400.0 * in_camera.truncate() / in_camera.z
+    };
+    let mut largest = 0.0_f64;
+    for k in 0..500_u32 {
+        let [a, b, c, d] = crate::noise::pcg4d([k, 1, 2, 3]).map(|bits| f64::from(bits >> 8) / f64::from(1 << 24));
+        let z_m = 50.0 + 400.0 * a;
+        let point = pose.position_ned_m + pose.ned_from_camera * (z_m * DVec3::new(1.5 * b - 0.8, 1.1 * c - 0.6, 1.0));
+        let bounds = Aabb { min: point, max: point };
+        let shift = DQuat::from_euler(EulerRot::ZYX, 7.0 * d, 5.0 * a, 3.0 * c) * DVec3::X * tolerance.error_m(&bounds, &pose);
+        largest = largest.max(project(point + shift).distance(project(point)));
+    }
+    assert!(largest <= 0.1001 && largest > 0.07, "{largest}");
+    // Behind, around the camera, and nowhere: nothing may be displaced.
+    for (low, high) in [(DVec3::splat(-1e4), DVec3::splat(1e4)), (DVec3::splat(f64::NAN), DVec3::splat(f64::NAN))] {
+        assert_eq!(tolerance.error_m(&Aabb { min: low, max: high }, &pose), 0.0);
+    }
+    let turned = DMat3::from_quat(pose.ned_from_camera) * 3.0;
+    assert!((stretch(&turned) - 3.0).abs() < 1e-12);
+    let sheared = turned * DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::new(0.0, 0.0, 0.2));
+    assert!((0..99).all(|k| (sheared * (DQuat::from_rotation_z(f64::from(k)) * DVec3::X)).length() <= stretch(&sheared)));
+}
