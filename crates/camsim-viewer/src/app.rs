@@ -16,7 +16,8 @@ use crate::{
     panes,
     pulse::Pulse,
     settings::Settings,
-    state::State,
+    sheet,
+    state::{Leaving, State},
 };
 
 /// Under which settings are stored.
@@ -33,6 +34,7 @@ pub struct Viewer {
     /// What the oracle was asked for, to ask once.
     asked_exact: Option<ExactKey>,
     pulse: Option<Pulse>,
+    title: String,
 }
 
 /// A request to the oracle by what tells it from others.
@@ -68,11 +70,14 @@ impl Viewer {
         if let Some(path) = scenario {
             state.open(path);
         }
-        Self { state, engine, asked: None, asked_exact: None, pulse: Pulse::from_env() }
+        Self { state, engine, asked: None, asked_exact: None, pulse: Pulse::from_env(), title: String::new() }
     }
 
     /// As eframe starts it, with what was remembered.
     pub fn restored(creation: &eframe::CreationContext<'_>, scenario: Option<PathBuf>, exporter: Option<Exporter>) -> Self {
+        if let Some(render) = &creation.wgpu_render_state {
+            sheet::register(&creation.egui_ctx, render);
+        }
         let settings = creation.storage.and_then(|storage| eframe::get_value::<Settings>(storage, SETTINGS_KEY)).unwrap_or_default();
         Self::new(&creation.egui_ctx, scenario, settings, exporter)
     }
@@ -84,9 +89,12 @@ impl Viewer {
         let mut out = Outbox::new();
         panes::shortcuts::listen(&context, &self.state, &mut out);
         take_drops(&context, &mut out);
+        self.guard_close(&context, &mut out);
+        out.extend(self.state.browsed());
         panes::show(ui, &self.state, &mut out);
         out.into_iter().for_each(|message| self.state.apply(message, &context));
         self.ask();
+        self.name_window(&context);
         self.plan_repaint(&context);
         if let Some(pulse) = &mut self.pulse {
             pulse.beat(&self.state, &context);
@@ -113,6 +121,29 @@ impl Viewer {
         if !self.asked_exact.as_ref().is_some_and(|asked| asked.is(&key)) {
             self.engine.want_exact(exact);
             self.asked_exact = Some(key);
+        }
+    }
+
+    /// Changes are not lost by a wrong click: a second wish to close, out of the question about them, is obeyed.
+    fn guard_close(&self, context: &egui::Context, out: &mut Outbox) {
+        if context.input(|input| input.viewport().close_requested())
+            && self.state.is_unsaved()
+            && self.state.leaving != Some(Leaving::Closing)
+        {
+            context.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            out.push(Message::Close);
+        }
+    }
+
+    /// The file's name stands in the title, for whoever has several windows.
+    fn name_window(&mut self, context: &egui::Context) {
+        let name =
+            self.state.document.as_ref().and_then(|document| document.path.file_name()).map(|name| name.to_string_lossy().into_owned());
+        let mark = if self.state.is_unsaved() { "*" } else { "" };
+        let title = name.map_or_else(|| "camsim".to_owned(), |name| format!("{name}{mark} - camsim"));
+        if title != self.title {
+            context.send_viewport_cmd(egui::ViewportCommand::Title(title.clone()));
+            self.title = title;
         }
     }
 

@@ -85,6 +85,18 @@ impl Document {
         self.problems.iter().find(|problem| problem.key.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.')))
     }
 
+    /// A path as the scenario's file has it: without the folder that it is in, if it is in it.
+    pub fn beside(&self, path: &str) -> String {
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let name = folder.and_then(|folder| Path::new(path).strip_prefix(folder).ok());
+        name.map_or_else(|| path.to_owned(), |name| name.display().to_string())
+    }
+
+    /// What such a path means: from the folder of the scenario's file.
+    pub fn resolved(&self, path: &str) -> String {
+        self.path.parent().map_or_else(|| path.to_owned(), |folder| folder.join(path).display().to_string())
+    }
+
     /// Gives a key a value, or takes it away. While `ongoing` (a hand drags it), all values of the same key are one step.
     pub fn set(&mut self, key: &str, value: Option<Value>, ongoing: bool) {
         let mut tree = self.tree.clone();
@@ -146,14 +158,13 @@ impl Document {
     /// Text for people.
     pub fn to_toml(&self, folder: Option<&Path>) -> Result<String, String> {
         let mut tree = self.tree.clone();
-        let of_paths = keys().iter().filter(|(_, kind)| *kind == Kind::Path);
-        for (key, _) in of_paths {
-            let Some(Value::String(path)) = find(&tree, key) else { continue };
+        for key in path_keys(&tree) {
+            let Some(Value::String(path)) = find(&tree, &key) else { continue };
             let relative = folder.and_then(|folder| Path::new(path).strip_prefix(folder).ok()).map(|path| path.display().to_string());
             // What is elsewhere must be found from anywhere.
             let text =
                 relative.unwrap_or_else(|| std::path::absolute(path).map_or_else(|_| path.clone(), |path| path.display().to_string()));
-            place(&mut tree, key, Some(Value::String(text)));
+            place(&mut tree, &key, Some(Value::String(text)));
         }
         toml::to_string(&tree).map_err(|error| error.to_string())
     }
@@ -171,6 +182,13 @@ impl Document {
         self.path = path.into();
         self.saved = self.tree.clone();
         Ok(())
+    }
+
+    /// Keys of the file that were taken away: what [`Document::command_line`] cannot say.
+    pub fn left_out(&self) -> Vec<String> {
+        let mut only_before = Vec::new();
+        missing(&self.saved, &self.tree, "", &mut only_before);
+        only_before
     }
 
     /// The `camsim render` that renders the document: its file with every change as `--set`.
@@ -221,6 +239,26 @@ impl Document {
 
 fn tree_of(scenario: &Scenario) -> Result<Table, String> {
     Table::try_from(scenario).map_err(|error| format!("{error}; whole numbers in TOML end at 2^63"))
+}
+
+/// Keys of all paths, those in the tables of lists by number.
+fn path_keys(tree: &Table) -> Vec<String> {
+    let of_list = |key: &str| {
+        let lists = keys().iter().filter(|(_, kind)| *kind == Kind::Tables).map(|(list, _)| *list);
+        lists
+            .filter_map(|list| Some((list, key.strip_prefix(list)?.strip_prefix('.')?)))
+            .map(|(list, leaf)| (list.to_owned(), leaf.to_owned()))
+            .next()
+    };
+    let paths = keys().iter().filter(|(_, kind)| *kind == Kind::Path);
+    let expanded = paths.flat_map(|(key, _)| match of_list(key) {
+        None => vec![(*key).to_owned()],
+        Some((list, leaf)) => {
+            let count = find(tree, &list).and_then(Value::as_array).map_or(0, Vec::len);
+            (0..count).map(|at| format!("{list}.{at}.{leaf}")).collect()
+        }
+    });
+    expanded.collect()
 }
 
 fn find<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
@@ -275,6 +313,18 @@ fn differences(now: &Table, before: &Table, prefix: &str, into: &mut Vec<(String
         match (value, before.get(name)) {
             (Value::Table(now), Some(Value::Table(before))) => differences(now, before, &key, into),
             (value, before) if before != Some(value) => into.push((key, value.clone())),
+            _ => {}
+        }
+    }
+}
+
+/// Keys of `before` that `now` has not.
+fn missing(before: &Table, now: &Table, prefix: &str, into: &mut Vec<String>) {
+    for (name, value) in before {
+        let key = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        match (value, now.get(name)) {
+            (Value::Table(before), Some(Value::Table(now))) => missing(before, now, &key, into),
+            (_, None) => into.push(key),
             _ => {}
         }
     }

@@ -1,11 +1,14 @@
 //! What a file that is dropped on the window is, and what becomes of it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use camsim_io::{camera_file::import_camera, scenario_file::read_checked_camera};
 use toml::{Table, Value};
 
-use crate::{document::Document, state::State};
+use crate::{
+    document::Document,
+    state::{Leaving, State},
+};
 
 /// Uses of a picture: what to call them, and their keys.
 pub const PICTURE_USES: [(&str, &str); 3] = [
@@ -19,7 +22,9 @@ pub fn take(state: &mut State, path: &Path) {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     match ending.as_str() {
         "toml" if is_camera(path) => camera(state, read_checked_camera(path).map_err(|error| error.to_string())),
+        "toml" if state.is_unsaved() => state.leaving = Some(Leaving::For(path.into())),
         "toml" => state.open(path.into()),
+        "yaml" | "yml" if is_target(path) => set(state, "scene.board.target", path),
         "yaml" | "yml" | "xml" | "json" => camera(state, import_camera(path).map_err(|error| error.to_string())),
         "csv" | "txt" | "tum" | "log" => set(state, "flight.log", path),
         "png" | "jpg" | "jpeg" | "bmp" | "gif" | "pgm" | "ppm" => {
@@ -28,10 +33,11 @@ pub fn take(state: &mut State, path: &Path) {
                 state.notice(no_scenario(path));
             }
         }
+        "glb" | "gltf" => model(state, path),
         "tif" | "tiff" => set(state, "scene.terrain.dem", path),
         _ => state.notice(format!(
-            "{}: neither a scenario or camera (.toml), a calibration (.yaml, .xml, .json), a log (.csv, .txt, .tum), a picture (.png, .jpg, .bmp, ...) nor \
-             a terrain (.tif)",
+            "{}: neither a scenario or camera (.toml), a calibration or a Kalibr target (.yaml, .xml, .json), a log (.csv, .txt, .tum), \
+             a picture (.png, .jpg, .bmp, ...), a terrain (.tif) nor a model (.glb, .gltf)",
             path.display()
         )),
     }
@@ -50,6 +56,29 @@ fn is_camera(path: &Path) -> bool {
     table.is_some_and(|table| !table.contains_key("flight") && !table.contains_key("scene") && !table.contains_key("camera"))
 }
 
+/// Whether a YAML file describes a calibration target, as Kalibr's do, not a camera.
+fn is_target(path: &Path) -> bool {
+    std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("target_type")))
+}
+
+/// One more model: where the pixel that is kept looks at, else at the origin; on the ground if there is any.
+fn model(state: &mut State, path: &Path) {
+    let at = state.pinned.and_then(|pixel| state.heard.point_ned_m(pixel)).map_or([0.0; 3], |point| point.to_array());
+    let told = match &mut state.document {
+        Some(document) => std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display())).and_then(|file| {
+            let mut entry = Table::new();
+            entry.insert("file".into(), Value::String(file.display().to_string()));
+            entry.insert("at".into(), Value::Array(at.into_iter().map(Value::Float).collect()));
+            entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
+            let mut list = document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
+            list.push(Value::Table(entry));
+            put(document, "scene.gltf", Value::Array(list), path)
+        }),
+        None => Err(no_scenario(path)),
+    };
+    after(state, told);
+}
+
 fn camera(state: &mut State, read: Result<camsim_core::scenario::CameraSpec, String>) {
     let told = match (&mut state.document, read) {
         (Some(document), Ok(camera)) => document.set_camera(&camera),
@@ -60,16 +89,18 @@ fn camera(state: &mut State, read: Result<camsim_core::scenario::CameraSpec, Str
 }
 
 fn set(state: &mut State, key: &str, path: &Path) {
-    let told = match &mut state.document {
-        Some(document) => put(document, key, path),
-        None => Err(no_scenario(path)),
+    let absolute = std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()));
+    let told = match (&mut state.document, absolute) {
+        (Some(document), Ok(absolute)) => put(document, key, Value::String(absolute.display().to_string()), path),
+        (Some(_), Err(error)) => Err(error),
+        (None, _) => Err(no_scenario(path)),
     };
     after(state, told);
 }
 
-fn put(document: &mut Document, key: &str, path: &Path) -> Result<(), String> {
-    let absolute: PathBuf = std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    document.set(key, Some(Value::String(absolute.display().to_string())), false);
+/// Puts a value in place, or leaves all as it was.
+fn put(document: &mut Document, key: &str, value: Value, path: &Path) -> Result<(), String> {
+    document.set(key, Some(value), false);
     match document.problems.first() {
         None => Ok(()),
         Some(problem) => {

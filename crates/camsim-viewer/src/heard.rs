@@ -1,12 +1,15 @@
-//! What the engine has said: the last pictures with their textures, what is loaded, what went wrong.
+//! What the engine has said: the last pictures, what is loaded, what went wrong.
 
 use std::sync::Arc;
 
 use camsim_core::{plan::FramePlan, reference::Oracle, sequence::Sequence};
 use camsim_io::load::Loaded;
-use eframe::egui::{self, ColorImage, TextureFilter, TextureHandle, TextureOptions};
+use eframe::egui;
 
-use crate::engine::{Difference, ExactPicture, FrameReply, Picture, Reply, Size, Stage};
+use crate::{
+    engine::{Difference, ExactPicture, FrameReply, Picture, Reply, Size, Stage},
+    sheet::Sheet,
+};
 
 /// All that panes know of the engine.
 #[derive(Default)]
@@ -37,30 +40,30 @@ pub struct Heard {
 pub struct Shown {
     /// As they came.
     pub reply: FrameReply,
-    /// The same on egui's device.
-    pub textures: Vec<TextureHandle>,
+    /// The same on the screen.
+    pub sheets: Vec<Sheet>,
     /// The difference there.
-    pub difference: Option<TextureHandle>,
+    pub difference: Option<Sheet>,
     /// The depth there.
-    pub depth: Option<TextureHandle>,
+    pub depth: Option<Sheet>,
 }
 
 /// The oracle's picture, as far as it has come.
 pub struct Exact {
     /// As it came.
     pub picture: ExactPicture,
-    /// On egui's device.
-    pub texture: TextureHandle,
+    /// On the screen.
+    pub sheet: Sheet,
     /// The difference there.
-    pub difference: Option<TextureHandle>,
+    pub difference: Option<Sheet>,
 }
 
 /// One picture to look at.
 #[derive(Clone, Copy)]
 pub struct Sight<'a> {
-    /// On egui's device.
-    pub texture: &'a TextureHandle,
-    /// Pixels of the texture.
+    /// On the screen.
+    pub sheet: &'a Sheet,
+    /// Its pixels.
     pub size_px: [u32; 2],
     /// Linear R G B A.
     pub color_rgba: &'a [f32],
@@ -92,10 +95,11 @@ impl Heard {
                 self.shown = Some(Shown::new(*reply, self.shown.take(), context));
             }
             Reply::Exact(picture) => {
-                let (old, old_difference) = self.exact.take().map_or((None, None), |exact| (Some(exact.texture), exact.difference));
-                let texture = upload(context, "oracle", &picture.image, old);
-                let difference = picture.difference.as_ref().map(|d| upload(context, "oracle difference", &d.image, old_difference));
-                self.exact = Some(Exact { picture: *picture, texture, difference });
+                let (old, old_difference) = self.exact.take().map_or((None, None), |exact| (Some(exact.sheet), exact.difference));
+                let sheet = Sheet::new(context, "oracle", picture.image.clone(), old);
+                let difference =
+                    picture.difference.as_ref().map(|d| Sheet::new(context, "oracle difference", d.image.clone(), old_difference));
+                self.exact = Some(Exact { picture: *picture, sheet, difference });
             }
         }
     }
@@ -109,14 +113,27 @@ impl Heard {
     pub fn sight(&self, stage: Stage) -> Option<Sight<'_>> {
         let shown = self.shown.as_ref()?;
         if stage == Stage::Oracle {
-            let Exact { picture, texture, .. } = self.current_exact()?;
+            let Exact { picture, sheet, .. } = self.current_exact()?;
             let size_px = picture.sequence.scenario.camera.size_px;
-            return Some(Sight { texture, size_px, color_rgba: &picture.color_rgba, stage, plan: None });
+            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None });
         }
         let at = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
-        let (picture, texture) = (shown.reply.pictures.get(at)?, shown.textures.get(at)?);
+        let (picture, sheet) = (shown.reply.pictures.get(at)?, shown.sheets.get(at)?);
         let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
-        Some(Sight { texture, size_px, color_rgba, stage, plan: Some(&picture.plan) })
+        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan) })
+    }
+
+    /// Path time of a frame's stamp, seconds.
+    pub fn stamp_s(&self, frame: u64) -> Option<f64> {
+        let sequence = self.sequence()?;
+        let camera = &sequence.scenario.camera;
+        Some(sequence.start_s + (frame as f64 + camera.phase) / camera.fps)
+    }
+
+    /// What a pixel of the frame shown sees, if that is a surface; `None` as long as there are no looks into it.
+    pub fn point_ned_m(&self, pixel: [u32; 2]) -> Option<glam::DVec3> {
+        let (looks, shown) = (self.current_looks()?, self.shown.as_ref()?);
+        looks.look(shown.reply.frame, pixel, glam::DVec2::ZERO, 0.0)?.hit.map(|hit| hit.point_ned_m)
     }
 
     /// The first picture of the last reply.
@@ -136,7 +153,7 @@ impl Heard {
     }
 
     /// The difference on show: with the oracle or between two rendered pictures.
-    pub fn difference(&self, with_oracle: bool) -> Option<(&Arc<Difference>, &TextureHandle)> {
+    pub fn difference(&self, with_oracle: bool) -> Option<(&Arc<Difference>, &Sheet)> {
         if with_oracle {
             let exact = self.current_exact()?;
             return exact.picture.difference.as_ref().zip(exact.difference.as_ref());
@@ -153,23 +170,12 @@ impl Heard {
 impl Shown {
     fn new(reply: FrameReply, before: Option<Self>, context: &egui::Context) -> Self {
         let (old, old_difference, old_depth) =
-            before.map_or((Vec::new(), None, None), |before| (before.textures, before.difference, before.depth));
+            before.map_or((Vec::new(), None, None), |before| (before.sheets, before.difference, before.depth));
         let mut old = old.into_iter();
-        let textures = reply.pictures.iter().map(|picture| upload(context, "picture", &picture.image, old.next())).collect();
-        let difference = reply.difference.as_ref().map(|difference| upload(context, "difference", &difference.image, old_difference));
-        let depth = reply.truth.as_ref().map(|truth| upload(context, "depth", &truth.image, old_depth));
-        Self { reply, textures, difference, depth }
-    }
-}
-
-/// Into a texture that is no longer needed, if there is one. Pixels stay pixels when enlarged.
-fn upload(context: &egui::Context, name: &str, image: &ColorImage, old: Option<TextureHandle>) -> TextureHandle {
-    let options = TextureOptions { magnification: TextureFilter::Nearest, minification: TextureFilter::Linear, ..TextureOptions::LINEAR };
-    match old {
-        Some(mut texture) => {
-            texture.set(image.clone(), options);
-            texture
-        }
-        None => context.load_texture(name, image.clone(), options),
+        let sheets = reply.pictures.iter().map(|picture| Sheet::new(context, "picture", picture.image.clone(), old.next())).collect();
+        let difference =
+            reply.difference.as_ref().map(|difference| Sheet::new(context, "difference", difference.image.clone(), old_difference));
+        let depth = reply.truth.as_ref().map(|truth| Sheet::new(context, "depth", truth.image.clone(), old_depth));
+        Self { reply, sheets, difference, depth }
     }
 }

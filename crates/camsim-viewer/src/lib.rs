@@ -11,6 +11,8 @@
 
 mod app;
 
+mod browse;
+
 mod document;
 
 mod drop;
@@ -35,7 +37,11 @@ mod series;
 
 mod settings;
 
+mod sheet;
+
 mod state;
+
+mod still;
 
 mod timeline;
 
@@ -49,6 +55,7 @@ use std::path::PathBuf;
 use anyhow::{Context, anyhow};
 
 pub use export::{ExportJob, Exporter, Progress};
+pub use still::{Still, still};
 
 /// Opens the viewer on a scenario, or on the built-in flight, and returns when its window is closed. `exporter` renders to files.
 ///

@@ -41,8 +41,14 @@ pub enum Message {
     Undo,
     /// One step on.
     Redo,
-    /// Opens a scenario.
+    /// Opens a scenario; asks first if that loses changes.
     Open(PathBuf),
+    /// The same, whatever it loses.
+    OpenAnyway(PathBuf),
+    /// The hand wants to close the window: asks first if that loses changes.
+    Close,
+    /// What was asked for stays undone.
+    Stay,
     /// Something dropped on the window.
     Drop(PathBuf),
     /// Reads all files again.
@@ -63,6 +69,8 @@ pub enum Message {
     UsePicture(Option<&'static str>),
     /// The list of shortcuts.
     Help(bool),
+    /// The desktop's own file dialog for what is asked.
+    Browse,
     /// The window with the path to open or to save to; `None` closes it.
     Ask(Option<Question>),
 }

@@ -6,7 +6,7 @@ mod inspector;
 mod map;
 mod menu;
 mod notices;
-mod parameters;
+pub(crate) mod parameters;
 mod plan;
 mod plots;
 pub mod shortcuts;

@@ -3,10 +3,12 @@
 use std::sync::{Arc, Weak};
 
 use camsim_io::load::Loaded;
-use glam::{DQuat, EulerRot};
+use glam::{DQuat, DVec3, EulerRot};
 
 /// Instants of a line: more than a plot has points across.
 const POINTS: u64 = 800;
+/// Instants between two of them that errors are looked for at, at most: every row of a log of 40 Hz over 1000 s.
+const MOST_BETWEEN: u64 = 50;
 
 /// What is plotted, over path time.
 #[derive(Clone, Debug)]
@@ -29,6 +31,8 @@ pub struct Channel {
     pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
     /// What may not be exceeded.
     pub limit: Option<f64>,
+    /// The tracker less the log, where there is a log: of the instants between two points the largest.
+    pub error: Option<Vec<[f64; 2]>>,
 }
 
 impl Series {
@@ -41,19 +45,20 @@ impl Series {
         let state = |t_s: f64| sequence.path.trajectory.state(t_s);
         let (limits, camera) = (&loaded.tracked.limits, &sequence.scenario.camera);
         let mut channels = Vec::new();
-        for (axis, name) in ["north, m", "east, m", "down, m"].into_iter().enumerate() {
-            let of_log = over(&|t_s| loaded.log.interpolate(t_s).0[axis]);
-            let tracked = over(&|t_s| state(t_s).position_ned_m[axis]);
-            channels.push(against_log(name, "m", of_log, tracked));
-        }
-        for (axis, name) in ["roll, deg", "pitch, deg", "yaw, deg"].into_iter().enumerate() {
-            let of_log = continuous(over(&|t_s| euler_deg(loaded.log.interpolate(t_s).1)[axis]));
-            let tracked = continuous(over(&|t_s| euler_deg(state(t_s).ned_from_body)[axis]));
-            channels.push(against_log(name, "deg", of_log, tracked));
+        let errors = errors(loaded, span_s);
+        for (axis, name) in ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg"].into_iter().enumerate() {
+            let of_log = over(&|t_s| of_log(loaded, t_s)[axis]);
+            let tracked = over(&|t_s| of_tracker(loaded, t_s)[axis]);
+            let Errors { rms, largest, points } = errors[axis].clone();
+            let (unit, is_angle) = if axis < 3 { ("m", false) } else { ("deg", true) };
+            let note = format!("error {rms:.3} {unit} RMS, {largest:.3} at most");
+            let lines = [("log", of_log), ("tracker", tracked)];
+            let lines = lines.into_iter().map(|(name, points)| (name, if is_angle { continuous(points) } else { points })).collect();
+            channels.push(Channel { name, note, lines, limit: None, error: Some(points) });
         }
         let mut plain = |name: &'static str, points: Vec<[f64; 2]>, limit: Option<f64>| {
             let largest = points.iter().map(|point| point[1]).fold(0.0, f64::max);
-            channels.push(Channel { name, note: format!("up to {largest:.3}"), lines: vec![(name, points)], limit });
+            channels.push(Channel { name, note: format!("up to {largest:.3}"), lines: vec![(name, points)], limit, error: None });
         };
         let spec = &sequence.scenario.tracker;
         plain("speed, m/s", over(&|t_s| state(t_s).velocity_ned_m_s.length()), Some(limits.max_speed_m_s));
@@ -74,22 +79,61 @@ impl Series {
     }
 }
 
-fn against_log(name: &'static str, unit: &str, of_log: Vec<[f64; 2]>, tracked: Vec<[f64; 2]>) -> Channel {
-    let wrap = |error: f64| if unit == "deg" { error - 360.0 * (error / 360.0).round() } else { error };
-    let errors = of_log.iter().zip(&tracked).map(|(log, tracked)| wrap(log[1] - tracked[1]).abs());
-    let (mut squares, mut largest, mut count) = (0.0, 0.0_f64, 0);
-    for error in errors {
-        squares += error * error;
-        largest = largest.max(error);
-        count += 1;
+/// How far the tracker is from the log.
+#[derive(Clone, Debug, Default)]
+struct Errors {
+    rms: f64,
+    largest: f64,
+    points: Vec<[f64; 2]>,
+}
+
+impl Errors {
+    /// From errors in order of time, so many for each point.
+    fn of(errors: &[[f64; 2]], for_each: usize) -> Self {
+        let larger = |a: [f64; 2], b: [f64; 2]| if b[1].abs() > a[1].abs() { b } else { a };
+        let points: Vec<[f64; 2]> = errors.chunks(for_each.max(1)).filter_map(|part| part.iter().copied().reduce(larger)).collect();
+        let squares: f64 = errors.iter().map(|error| error[1] * error[1]).sum();
+        let largest = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
+        Self { rms: (squares / errors.len().max(1) as f64).sqrt(), largest, points }
     }
-    let rms = (squares / f64::from(count.max(1))).sqrt();
-    Channel {
-        name,
-        note: format!("error {rms:.3} {unit} RMS, {largest:.3} at most"),
-        lines: vec![("log", of_log), ("tracker", tracked)],
-        limit: None,
+}
+
+/// North, east, down, roll, pitch, yaw.
+fn errors(loaded: &Loaded, span_s: f64) -> [Errors; 6] {
+    let start_s = loaded.sequence.start_s;
+    let rows = loaded.log.rows.iter().filter(|row| row.t_s >= start_s && row.t_s <= start_s + span_s).count() as u64;
+    let between = (rows / POINTS + 1).min(MOST_BETWEEN);
+    let count = POINTS * between;
+    let mut found: [Vec<[f64; 2]>; 6] = Default::default();
+    for k in 0..=count {
+        let t_s = start_s + span_s * k as f64 / count as f64;
+        let (log, tracked) = (of_log(loaded, t_s), of_tracker(loaded, t_s));
+        for (axis, errors) in found.iter_mut().enumerate() {
+            let error = tracked[axis] - log[axis];
+            errors.push([t_s, if axis < 3 { error } else { shorter_deg(error) }]);
+        }
     }
+    found.map(|errors| Errors::of(&errors, between as usize))
+}
+
+/// An angle's error does not count turns.
+fn shorter_deg(error: f64) -> f64 {
+    error - 360.0 * (error / 360.0).round()
+}
+
+fn of_log(loaded: &Loaded, t_s: f64) -> [f64; 6] {
+    let (place, attitude) = loaded.log.interpolate(t_s);
+    channels_of(place, attitude)
+}
+
+fn of_tracker(loaded: &Loaded, t_s: f64) -> [f64; 6] {
+    let state = loaded.sequence.path.trajectory.state(t_s);
+    channels_of(state.position_ned_m, state.ned_from_body)
+}
+
+fn channels_of(place: DVec3, ned_from_body: DQuat) -> [f64; 6] {
+    let [roll, pitch, yaw] = euler_deg(ned_from_body);
+    [place.x, place.y, place.z, roll, pitch, yaw]
 }
 
 fn euler_deg(ned_from_body: DQuat) -> [f64; 3] {
@@ -112,7 +156,7 @@ fn continuous(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
 fn image_speed_px_s(loaded: &Loaded, focal_px: f64, t_s: f64) -> f64 {
     let path = &loaded.sequence.path;
     let (pose, rate) = (path.pose(t_s), path.rate_camera(t_s));
-    let axis_ned = pose.ned_from_camera * glam::DVec3::Z;
+    let axis_ned = pose.ned_from_camera * DVec3::Z;
     let velocity = pose.ned_from_camera.conjugate() * path.velocity_ned(t_s);
     let terrain = loaded.sequence.scene.terrain.as_ref();
     let depth_m = match terrain {
@@ -141,7 +185,7 @@ mod tests {
         let terrain = loaded.sequence.scene.terrain.as_ref().expect("a terrain");
         for t_s in [25.3, 27.0, 28.5] {
             let pose = path.pose(t_s);
-            let axis = pose.ned_from_camera * glam::DVec3::Z;
+            let axis = pose.ned_from_camera * DVec3::Z;
             let point = pose.position_ned_m + axis * terrain.intersect(pose.position_ned_m, axis, f64::INFINITY).expect("ground").t;
             // Central difference of the fixed point's ideal coordinates.
             let uv = |t_s: f64| {
@@ -153,6 +197,29 @@ mod tests {
             let exact = 400.0 * (uv(t_s + h) - uv(t_s - h)).length() / (2.0 * h);
             let found = image_speed_px_s(&loaded, 400.0, t_s);
             assert!((found - exact).abs() < 1e-4 * exact, "{found} {exact} px/s at {t_s} s");
+        }
+    }
+
+    #[test]
+    fn errors_keep_their_peaks_however_few_points_there_are() {
+        let mut errors: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k), 0.1]).collect();
+        errors[517] = [517.0, -3.0];
+        let found = Errors::of(&errors, 100);
+        assert_eq!((found.points.len(), found.points[5], found.largest), (10, [517.0, -3.0], 3.0));
+        assert!((found.rms - ((999.0 * 0.01 + 9.0) / 1000.0_f64).sqrt()).abs() < 1e-12, "{}", found.rms);
+        assert_eq!([shorter_deg(-358.0), shorter_deg(3.0), shorter_deg(190.0)], [2.0, 3.0, -170.0]);
+    }
+
+    #[test]
+    fn errors_are_those_of_the_tracker_at_its_instants() {
+        let loaded = loaded();
+        let series = Series::new(&loaded);
+        for (axis, channel) in series.channels.iter().take(6).enumerate() {
+            let error = channel.error.as_ref().expect("there is a log");
+            for [t_s, error] in error.iter().step_by(97) {
+                let found = of_tracker(&loaded, *t_s)[axis] - of_log(&loaded, *t_s)[axis];
+                assert!((shorter_deg(found - error)).abs() < 1e-9, "{} at {t_s}: {found} {error}", channel.name);
+            }
         }
     }
 

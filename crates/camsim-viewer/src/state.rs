@@ -1,10 +1,14 @@
 //! Everything that the window knows, and what a wish of a pane does to it.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use eframe::egui;
 
 use crate::{
+    browse::{Answer, Browse},
     document::Document,
     drop,
     engine::{ExactWanted, Picture, Reply, Size, Stage, Wanted},
@@ -22,6 +26,15 @@ pub const REST_S: f64 = 0.2;
 const QUICK_MS: f64 = 60.0;
 /// Recent files that are remembered.
 const MOST_RECENT: usize = 8;
+
+/// What would lose changes that are not saved.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Leaving {
+    /// Another scenario.
+    For(PathBuf),
+    /// The end.
+    Closing,
+}
 
 /// The window's state.
 pub struct State {
@@ -45,10 +58,14 @@ pub struct State {
     pub question: Option<Question>,
     /// A dropped picture whose use is not yet known.
     pub dropped_picture: Option<PathBuf>,
+    /// What is wanted but would lose changes.
+    pub leaving: Option<Leaving>,
     /// The last export.
     pub export: Option<Arc<ExportJob>>,
     /// Files opened lately, the last one first.
     pub recent: Vec<PathBuf>,
+    /// The desktop's own dialog, while it is open.
+    browse: Option<Browse>,
     exporter: Option<Exporter>,
     /// egui's time now, and when a hand was at work last.
     now_s: f64,
@@ -69,8 +86,10 @@ impl State {
             help: false,
             question: None,
             dropped_picture: None,
+            leaving: None,
             export: None,
             recent: settings.recent,
+            browse: None,
             exporter,
             now_s: 0.0,
             touched_s: 0.0,
@@ -188,6 +207,10 @@ impl State {
             }
             Message::Help(open) => self.help = open,
             Message::Ask(question) => self.question = question,
+            Message::Browse => {
+                let question = self.question.as_ref();
+                self.browse = question.map(|question| Browse::ask(question.saves, Path::new(&question.path), context));
+            }
             Message::Export(wish) => {
                 if let (Some(document), Some(exporter)) = (&self.document, &self.exporter) {
                     let scenario = (*document.scenario).clone();
@@ -199,7 +222,10 @@ impl State {
                     job.cancel();
                 }
             }
-            Message::Open(path) => self.open(path),
+            Message::Open(path) if self.is_unsaved() => (self.question, self.leaving) = (None, Some(Leaving::For(path))),
+            Message::Open(path) | Message::OpenAnyway(path) => self.open(path),
+            Message::Close => self.leaving = Some(Leaving::Closing),
+            Message::Stay => self.leaving = None,
             Message::Drop(path) => drop::take(self, &path),
             Message::UsePicture(key) => drop::use_picture(self, key),
             _ => {}
@@ -245,7 +271,12 @@ impl State {
             }),
             Message::CopyCommand => {
                 context.copy_text(document.command_line());
-                Ok(Some("the command line is on the clipboard".into()))
+                Ok(Some(match document.left_out().as_slice() {
+                    [] => "the command line is on the clipboard".into(),
+                    keys => {
+                        format!("the command line is on the clipboard; it cannot leave out {}: save the scenario for that", keys.join(", "))
+                    }
+                }))
             }
             _ => return false,
         };
@@ -258,7 +289,7 @@ impl State {
 
     /// Opens a scenario; what is open stays if it cannot be.
     pub fn open(&mut self, path: PathBuf) {
-        self.question = None;
+        (self.question, self.leaving) = (None, None);
         match Document::open(&path) {
             Ok(mut document) => {
                 document.reading = self.document.as_ref().map_or(0, |before| before.reading + 1);
@@ -272,6 +303,29 @@ impl State {
             }
             Err(error) => self.notice(error),
         }
+    }
+
+    /// What the desktop's dialog has answered, if it has: the wish that follows.
+    pub fn browsed(&mut self) -> Option<Message> {
+        let answer = self.browse.as_ref().and_then(Browse::answer)?;
+        self.browse = None;
+        match answer {
+            Answer::Chosen(path, true) => Some(Message::Save(path)),
+            Answer::Chosen(path, false) => Some(Message::Open(path)),
+            Answer::Dismissed => None,
+            Answer::NoDialog => {
+                self.notice(
+                    "this desktop has no file dialog (on Linux: xdg-desktop-portal or zenity); type the path, or choose from the list"
+                        .into(),
+                );
+                None
+            }
+        }
+    }
+
+    /// Whether there are changes that are in no file.
+    pub fn is_unsaved(&self) -> bool {
+        self.document.as_ref().is_some_and(Document::is_unsaved)
     }
 
     /// Tells something until it is dismissed.

@@ -2,6 +2,9 @@
 
 mod editing;
 pub mod harness;
+mod leaving;
+mod looks;
+mod names;
 mod pages;
 mod pictures;
 mod scrubbing;

@@ -104,6 +104,8 @@ pub struct View {
     pub overlays: Overlays,
     /// Page on the right.
     pub tab: Tab,
+    /// Whether plots show the tracker's errors, not log and tracker.
+    pub plot_errors: bool,
 }
 
 impl Default for View {
@@ -118,6 +120,7 @@ impl Default for View {
             centre: [0.5, 0.5],
             overlays: Overlays::default(),
             tab: Tab::Pixel,
+            plot_errors: false,
         }
     }
 }

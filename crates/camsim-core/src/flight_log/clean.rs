@@ -85,9 +85,10 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
     if !uses_log_attitude {
         track_attitude::fill(&mut log_rows, tangent_frame.as_ref());
     }
-    if !report.is_clean() {
-        let named = raw.iter().filter(|row| report.names(row.line)).filter_map(|row| row.t_ns);
-        report.repaired_s = named.map(|t_ns| seconds_between(epoch_ns, t_ns) / options.speed).collect();
+    let repaired = report.take_lines();
+    if !repaired.is_empty() {
+        let times = raw.iter().filter(|row| repaired.contains(&row.line)).filter_map(|row| row.t_ns);
+        report.repaired_s = times.map(|t_ns| seconds_between(epoch_ns, t_ns) / options.speed).collect();
         report.repaired_s.sort_by(f64::total_cmp);
     }
     Ok(FlightLog { rows: log_rows, epoch_ns, frame, report })

@@ -1,6 +1,6 @@
 //! What cleaning a log found and did.
 
-use std::fmt;
+use std::{collections::HashSet, fmt};
 
 use crate::scenario::AngleKind;
 
@@ -14,11 +14,14 @@ pub struct Finding {
     pub count: usize,
     /// File lines of the first few.
     pub lines: Vec<usize>,
+    /// All of them, until their times are known.
+    pub(super) all: Vec<usize>,
 }
 
 impl Finding {
     pub(super) fn add(&mut self, line: usize) {
         self.count += 1;
+        self.all.push(line);
         if self.lines.len() < KEPT_LINES {
             self.lines.push(line);
         }
@@ -50,7 +53,7 @@ pub struct CleaningReport {
     pub longest_step_s: f64,
     /// Rows put in between because angles turn by more than 90 degrees.
     pub inserted: usize,
-    /// Where on the timeline the first few rows of each kind are, as far as they have a time: seconds since the first good row, divided by the
+    /// Where on the timeline the rows concerned are, as far as they have a time and without those of gaps: seconds since the first good row, divided by the
     /// `speed` factor; ascending.
     pub repaired_s: Vec<f64>,
     /// How angles were read: `Wrapped` or `Continuous`, never `Auto`.
@@ -63,9 +66,12 @@ impl CleaningReport {
         self.findings().iter().all(|(_, finding)| finding.count == 0)
     }
 
-    /// Whether a line of the file is among those that [`Finding::lines`] keep.
-    pub(super) fn names(&self, line: usize) -> bool {
-        self.findings().iter().any(|(_, finding)| finding.lines.contains(&line))
+    /// Gives the lines of all rows that were repaired, and keeps them no longer.
+    pub(super) fn take_lines(&mut self) -> HashSet<usize> {
+        let Self { unusable, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates, gaps, .. } = self;
+        gaps.all = Vec::new();
+        let repaired = [unusable, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates];
+        repaired.into_iter().flat_map(|finding| std::mem::take(&mut finding.all)).collect()
     }
 
     fn findings(&self) -> [(&'static str, &Finding); 7] {

@@ -100,6 +100,11 @@ fn spikes_of_several_rows_and_at_the_ends_go_too() {
         rows[i].position = RawPosition::Ned(DVec3::new(0.0, 60.0, -100.0));
     }
     assert_eq!(log(&rows).report.position_spikes.lines, [1, 51, 52, 100]);
+    // Every repaired row has its place on the timeline, however many there are.
+    let mut many = straight(400);
+    (100..200).for_each(|at| many[at].attitude = RawAttitude::EulerDeg([f64::NAN, 0.0, 0.0]));
+    let report = log(&many).report;
+    assert_eq!((report.attitude_missing.lines.len(), report.repaired_s.len()), (report::KEPT_LINES, 100));
 }
 
 #[test]

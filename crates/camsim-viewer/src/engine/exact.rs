@@ -81,7 +81,7 @@ fn draw(oracle: &Oracle, wanted: &ExactWanted, drawn: &mut Drawn, mailbox: &Mail
         speaker.say(Reply::Exact(Box::new(ExactPicture {
             sequence: wanted.sequence.clone(),
             frame: drawn.frame,
-            image: screen(size_px, &drawn.color_rgba),
+            image: Arc::new(screen(size_px, &drawn.color_rgba)),
             color_rgba: Arc::new(drawn.color_rgba.clone()),
             difference: difference.map(Arc::new),
             rows: drawn.rows as u32,

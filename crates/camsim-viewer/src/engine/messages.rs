@@ -114,7 +114,7 @@ pub struct Truth {
     /// Planar depth, metres, 0 = nothing there; row-major.
     pub depth_m: Vec<f32>,
     /// As a screen shows it.
-    pub image: ColorImage,
+    pub image: Arc<ColorImage>,
 }
 
 /// Pictures of a frame.
@@ -144,7 +144,7 @@ pub struct ExactPicture {
     /// Linear R G B A of the rows that are done; alpha is 0 in the others.
     pub color_rgba: Arc<Vec<f32>>,
     /// As a screen shows it.
-    pub image: ColorImage,
+    pub image: Arc<ColorImage>,
     /// The difference, if something was to be held against it: that picture less this one.
     pub difference: Option<Arc<Difference>>,
     /// Rows that are done, from the top.

@@ -1,5 +1,7 @@
 //! A rendered frame as the window shows it.
 
+use std::sync::Arc;
+
 use camsim_core::{frame::RenderedFrame, plan::FramePlan};
 use camsim_gpu::engine::FrameTimes;
 use camsim_io::write::{srgb_from_linear, srgb8};
@@ -19,14 +21,14 @@ pub struct Picture {
     /// How long that took.
     pub times: FrameTimes,
     /// As a screen shows it.
-    pub image: ColorImage,
+    pub image: Arc<ColorImage>,
 }
 
 /// The difference of two pictures, enlarged.
 #[derive(Debug, Default)]
 pub struct Difference {
     /// Grey is none.
-    pub image: ColorImage,
+    pub image: Arc<ColorImage>,
     /// Root of the mean square over pixels that are valid in both, 1/255 of the linear range.
     pub rms_dn: f64,
     /// Largest, same unit.
@@ -68,7 +70,7 @@ pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32) -> Option<
         }
     });
     let pixels: Vec<Color32> = pixels.collect();
-    let image = ColorImage::new(size_px.map(|side| side as usize), pixels);
+    let image = Arc::new(ColorImage::new(size_px.map(|side| side as usize), pixels));
     let rms_dn = 255.0 * (squares / (3 * both.max(1)) as f64).sqrt();
     let one_sided = one as f64 / (image.pixels.len().max(1)) as f64;
     Some(Difference { image, rms_dn, max_dn: 255.0 * max, one_sided })

@@ -41,11 +41,18 @@ impl Fault {
     }
 }
 
-/// Serves requests until the box is closed; opens the device anew after a loss, and tries again with each request where there is none.
+/// Serves requests until the box is closed.
 pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
+    run_on(|| Engine::new(AdapterChoice::Best), mailbox, library, speaker);
+}
+
+/// The same on what `open` gives: anew after a loss, with the request that met it once more, and with each request where there is nothing to run on.
+fn run_on(open: impl Fn() -> Result<Engine, GpuError>, mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
     let mut waiting = None;
+    // A request that loses one device after the other is told, not tried for ever.
+    let mut lost_with: Option<Wanted> = None;
     loop {
-        let engine = match Engine::new(AdapterChoice::Best) {
+        let engine = match open() {
             Ok(engine) => engine,
             Err(error) => {
                 speaker.say(Reply::Failed(error.to_string()));
@@ -60,12 +67,18 @@ pub fn run(mailbox: &Mailbox<Wanted>, library: &Library, speaker: &Speaker) {
         let mut worker = Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
         loop {
             let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
-            if let Err(fault) = worker.serve(&wanted, mailbox) {
-                speaker.say(Reply::Busy(String::new()));
-                speaker.say(Reply::Failed(fault.to_string()));
-                if fault.is_of_device() {
-                    break;
+            let Err(fault) = worker.serve(&wanted, mailbox) else {
+                lost_with = None;
+                continue;
+            };
+            speaker.say(Reply::Busy(String::new()));
+            speaker.say(Reply::Failed(fault.to_string()));
+            if fault.is_of_device() {
+                if lost_with.as_ref() != Some(&wanted) {
+                    waiting = Some(wanted.clone());
+                    lost_with = Some(wanted);
                 }
+                break;
             }
         }
     }
@@ -123,7 +136,7 @@ impl Worker<'_> {
         }
         let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color], frame)?;
         let Finished { frame, plan, times, .. } = done;
-        let image = screen(frame.size_px, &frame.color_rgba);
+        let image = Arc::new(screen(frame.size_px, &frame.color_rgba));
         let picture = Arc::new(Picture { stage, frame, plan, times, image });
         if self.kept.len() >= KEPT {
             self.kept.remove(0);
@@ -135,7 +148,7 @@ impl Worker<'_> {
     fn truth(&mut self, sequence: &Arc<Sequence>, size: Size, frame: u64) -> Result<Truth, Fault> {
         let done = self.render(&variant(sequence, Stage::Photometric, size)?, &[Channel::Color, Channel::Depth], frame)?;
         let depth_m = done.frame.depth_m.unwrap_or_default();
-        let image = depth_image(done.frame.size_px, &depth_m);
+        let image = Arc::new(depth_image(done.frame.size_px, &depth_m));
         Ok(Truth { depth_m, image })
     }
 
@@ -201,3 +214,6 @@ fn same_frames(a: &Sequence, b: &Sequence) -> bool {
         && a.zoom_track == b.zoom_track
         && a.scenario == b.scenario
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,6 +11,7 @@ use crate::{
     engine::{Size, Stage},
     heard::Sight,
     message::{Message, Outbox},
+    sheet::Place,
     state::State,
     view::Compare,
 };
@@ -44,6 +45,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let placements: Vec<Placement> =
         panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, 1.0 / ui.pixels_per_point())).collect();
     draw(ui, state, &placements);
+    for placement in &placements {
+        pinned(ui, state, placement);
+    }
     let on_wipe = state.view.compare == Compare::Wipe && placements.first().is_some_and(|placement| wipe(ui, state, placement, out));
     canvas::interact(ui, &response, &placements, state, on_wipe, out);
 }
@@ -52,24 +56,24 @@ fn draw(ui: &Ui, state: &State, placements: &[Placement]) {
     let view = &state.view;
     let Some(first) = placements.first() else { return };
     match view.compare {
-        Compare::Single => side(ui, state, first, view.a, first.pane, "A"),
+        Compare::Single => side(ui, state, first, view.a, first.pane, Place::A),
         Compare::SideBySide => {
-            side(ui, state, first, view.a, first.pane, "A");
+            side(ui, state, first, view.a, first.pane, Place::A);
             if let Some(second) = placements.get(1) {
-                side(ui, state, second, view.b, second.pane, "B");
+                side(ui, state, second, view.b, second.pane, Place::B);
             }
         }
         Compare::Wipe => {
             let (left, right) = first.pane.split_left_right_at_x(wipe_x(state, first));
-            side(ui, state, first, view.a, left, "A");
-            side(ui, state, first, view.b, right, "B");
+            side(ui, state, first, view.a, left, Place::A);
+            side(ui, state, first, view.b, right, Place::B);
         }
         Compare::Difference => difference(ui, state, first),
     }
 }
 
 /// One picture with its overlays, within `clip`.
-fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect, name: &str) {
+fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect, place: Place) {
     let painter = ui.painter().with_clip_rect(clip.intersect(placement.pane));
     let Some(sight) = state.heard.sight(stage) else {
         painter.text(
@@ -85,10 +89,10 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
         painter.rect_filled(placement.picture_rect(sight.size_px), 0.0, Color32::from_rgb(255, 0, 0));
     }
     let depth = state.heard.shown.as_ref().and_then(|shown| shown.depth.as_ref()).filter(|_| state.view.overlays.depth);
-    placement.image(&painter, depth.unwrap_or(sight.texture), sight.size_px);
+    placement.image(&painter, place, depth.unwrap_or(sight.sheet), sight.size_px);
     overlays::draw(&painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())), placement, state, &sight);
     let corner = clip.intersect(placement.pane).left_top() + egui::vec2(6.0, 4.0);
-    label(&painter, corner, &format!("{name}: {}{}", stage.label(), progress(state, &sight)));
+    label(&painter, corner, &format!("{place:?}: {}{}", stage.label(), progress(state, &sight)));
 }
 
 fn progress(state: &State, sight: &Sight<'_>) -> String {
@@ -108,11 +112,11 @@ fn difference(ui: &Ui, state: &State, placement: &Placement) {
     if view.a == view.b {
         return label(&painter, corner, &format!("{pair}: the same picture"));
     }
-    let Some((difference, texture)) = state.heard.difference(view.wants_oracle()) else {
+    let Some((difference, sheet)) = state.heard.difference(view.wants_oracle()) else {
         return label(&painter, corner, &format!("{pair}: on its way"));
     };
     let size_px = difference.image.size.map(|side| side as u32);
-    placement.image(&painter, texture, size_px);
+    placement.image(&painter, Place::A, sheet, size_px);
     let one_sided =
         if difference.one_sided > 0.0 { format!(", {:.2} % valid in one alone", 100.0 * difference.one_sided) } else { String::new() };
     // The oracle is always what is taken away.
@@ -129,6 +133,16 @@ fn label(painter: &egui::Painter, at: egui::Pos2, text: &str) {
     let rect = Rect::from_min_size(at, galley.size()).expand(3.0);
     painter.rect_filled(rect, 3.0, Color32::from_black_alpha(150));
     painter.galley(at, galley, Color32::WHITE);
+}
+
+/// A ring around the pixel that is kept in the inspector.
+fn pinned(ui: &Ui, state: &State, placement: &Placement) {
+    let Some([x, y]) = state.pinned else { return };
+    let painter = ui.painter().with_clip_rect(placement.pane);
+    let radius = (0.71 * placement.scale).max(6.0);
+    for (width, color) in [(3.0, Color32::BLACK), (1.5, Color32::from_rgb(255, 220, 60))] {
+        painter.circle_stroke(placement.screen(f64::from(x), f64::from(y)), radius, Stroke::new(width, color));
+    }
 }
 
 fn wipe_x(state: &State, placement: &Placement) -> f32 {

@@ -5,18 +5,23 @@ use camsim_core::{
     geodesy::LocalFrame,
     plan::FramePlan,
     reference::{KeyFrame, Look},
+    scenario::SceneSpec,
+    temporal::samples_for,
 };
 use camsim_io::write::srgb8;
 use eframe::egui::{self, Ui};
 use glam::DVec2;
 
-use super::widgets::{fact, facts};
+use super::widgets::{fact, facts, fixed, signed};
 use crate::{
     heard::Sight,
     message::{Message, Outbox},
     motion,
     state::State,
 };
+
+/// Pieces of a stretch of a pixel's way, to measure it.
+const PIECES: u32 = 4;
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -75,10 +80,10 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
         fact(
             ui,
             "row time",
-            format!("{:+.4} ms", 1e3 * (mid_s - stamp_s)),
+            format!("{} ms", signed(1e3 * (mid_s - stamp_s), 4)),
             "mid-exposure after the frame's stamp, Delta t = t_d + ((r + 0.5)/N - 0.5) t_r",
         );
-        fact(ui, "flight time", format!("{mid_s:.6} s"), "seconds from the log's first good row");
+        fact(ui, "flight time", format!("{} s", fixed(mid_s, 6)), "seconds from the log's first good row");
         match &look {
             None => fact(ui, "invalid", no_ray(state, pixel), "alpha 0"),
             Some(look) => {
@@ -91,6 +96,7 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
         let full = shown.reply.wanted.size == crate::engine::Size::Full;
         if let (Some(plan), Some(look)) = (plan.filter(|_| full), &look) {
             source(ui, plan, look);
+            samples(ui, plan, |phase| view.look(pixel, DVec2::ZERO, phase));
         }
     });
     if let Some(plan) = plan {
@@ -109,7 +115,12 @@ fn no_ray(state: &State, [x, y]: [u32; 2]) -> String {
 }
 
 fn ray(ui: &mut Ui, look: &Look) {
-    fact(ui, "ray u, v", format!("{:.6}, {:.6}", look.uv.x, look.uv.y), "ideal normalised coordinates (x/z, y/z), the lens's inverse");
+    fact(
+        ui,
+        "ray u, v",
+        format!("{}, {}", fixed(look.uv.x, 6), fixed(look.uv.y, 6)),
+        "ideal normalised coordinates (x/z, y/z), the lens's inverse",
+    );
     let off_axis = look.uv.length().atan().to_degrees();
     fact(ui, "off axis", format!("{off_axis:.3} deg"), "angle to the optical axis");
 }
@@ -118,16 +129,27 @@ fn seen(ui: &mut Ui, state: &State, look: &Look) {
     let Some(hit) = &look.hit else {
         return fact(ui, "sees", "sky", "no surface along the ray");
     };
-    let what = if hit.surface == 0 { "terrain".to_owned() } else { format!("surface {}", hit.surface) };
-    fact(ui, "sees", what, "the first surface along the ray");
+    let scene = state.heard.sequence().map(|sequence| &sequence.scenario.scene);
+    fact(ui, "sees", scene.map_or_else(String::new, |scene| surface(scene, hit.surface)), "the first surface along the ray");
     fact(ui, "depth", format!("{:.3} m", hit.depth_m), "planar, along the optical axis at the row's mid-exposure");
     let point = hit.point_ned_m;
     let range_m = point.distance(look.pose.position_ned_m);
     fact(ui, "range", format!("{range_m:.3} m"), "from the optical centre");
-    fact(ui, "north, east, down", format!("{:.3}, {:.3}, {:.3} m", point.x, point.y, point.z), "in the local frame");
+    fact(ui, "north, east, down", format!("{}, {}, {} m", fixed(point.x, 3), fixed(point.y, 3), fixed(point.z, 3)), "in the local frame");
     if let Some(frame) = state.heard.loaded.as_ref().and_then(|loaded| loaded.log.frame) {
         world(ui, &frame, point);
     }
+}
+
+/// What a surface is called: the terrain, then the pattern, the board and the models as the scene counts them.
+fn surface(scene: &SceneSpec, number: u32) -> String {
+    let flat = [("pattern", scene.pattern.is_some()), ("board", scene.board.is_some())];
+    let named = std::iter::once("terrain").chain(flat.into_iter().filter_map(|(name, is_there)| is_there.then_some(name)));
+    let known = named.clone().nth(number as usize).map(str::to_owned);
+    known.unwrap_or_else(|| match scene.gltf.as_slice() {
+        [only] => format!("model {}", only.file.file_name().unwrap_or(only.file.as_os_str()).to_string_lossy()),
+        _ => format!("model, mesh {}", number as usize + 1 - named.count()),
+    })
 }
 
 fn world(ui: &mut Ui, frame: &LocalFrame, point: glam::DVec3) {
@@ -140,10 +162,11 @@ fn moved(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
     let Some(path) = path else { return };
     let here = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]));
     let shift = path.at_stamp_px.map(|at| here - at);
-    let text = shift.map_or_else(|| "out of sight at the stamp".to_owned(), |shift| format!("{:+.3}, {:+.3} px", shift.x, shift.y));
+    let text =
+        shift.map_or_else(|| "out of sight at the stamp".to_owned(), |shift| format!("{}, {} px", signed(shift.x, 3), signed(shift.y, 3)));
     fact(ui, "displacement", text, "from where it would be in a frame taken at the stamp at once (the paper's Delta x)");
     let length_px: f64 = path.exposure_px.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
-    fact(ui, "blur", format!("{length_px:.3} px"), "length of its way over the exposure t_e");
+    fact(ui, "blur", format!("{} px", fixed(length_px, 3)), "length of its way over the exposure t_e");
 }
 
 fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
@@ -157,6 +180,25 @@ fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
         "source",
         format!("{:.3}, {:.3} px{where_}", at.x, at.y),
         "where it lies in the ideal frame of the middle of the frame's window",
+    );
+}
+
+/// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the kernel counts them. For taps it may have more.
+fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
+    let Some(blur) = plan.blur else { return };
+    let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
+    let pieces = PIECES * blur.stretches();
+    let at = |piece: u32| look(f64::from(piece) / f64::from(pieces) - 0.5).map(|look| key.source_px(&look));
+    let Some(way) = (0..=pieces).map(at).collect::<Option<Vec<DVec2>>>() else { return };
+    let steps: Vec<f64> = way.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
+    let of_stretch = |steps: &[f64]| samples_for(steps.iter().sum(), blur.samples_per_px, 1, blur.max_samples);
+    let count: u32 = steps.chunks(PIECES as usize).map(of_stretch).sum();
+    let length_px: f64 = steps.iter().sum();
+    fact(
+        ui,
+        "samples here",
+        format!("at least {count}, over {} px", fixed(length_px, 2)),
+        "of the exposure, by the length of its source's way through the ideal frame; as many as the footprint has taps, if that is more",
     );
 }
 

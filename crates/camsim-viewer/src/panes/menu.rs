@@ -9,7 +9,7 @@ use crate::{
     document::Document,
     drop::PICTURE_USES,
     message::{Message, Outbox, Question},
-    state::State,
+    state::{Leaving, State},
 };
 
 /// The line.
@@ -90,6 +90,9 @@ pub fn windows(context: &Context, state: &State, out: &mut Outbox) {
     if let Some(question) = &state.question {
         ask(context, question, &state.recent, out);
     }
+    if let (Some(leaving), Some(document)) = (&state.leaving, &state.document) {
+        unsaved(context, leaving, document, out);
+    }
     if let Some(path) = &state.dropped_picture {
         egui::Modal::new(egui::Id::unique("dropped picture")).show(context, |ui| {
             ui.label(format!("Use {} as", path.display()));
@@ -102,6 +105,34 @@ pub fn windows(context: &Context, state: &State, out: &mut Outbox) {
                 out.push(Message::UsePicture(None));
             }
         });
+    }
+}
+
+fn unsaved(context: &Context, leaving: &Leaving, document: &Document, out: &mut Outbox) {
+    let modal = egui::Modal::new(egui::Id::unique("unsaved")).show(context, |ui| {
+        ui.heading("Changes that are not saved");
+        ui.label(format!("{} has changes that are in no file.", document.path.display()));
+        ui.horizontal(|ui| {
+            if ui.button("Save as").on_hover_text("asks for a name; what you wanted is then asked anew").clicked() {
+                out.extend([Message::Stay, Message::Ask(Some(save_question(document)))]);
+            }
+            let (text, wish) = match leaving {
+                Leaving::For(path) => ("Open without saving", Some(Message::OpenAnyway(path.clone()))),
+                Leaving::Closing => ("Close without saving", None),
+            };
+            if ui.button(text).clicked() {
+                match wish {
+                    Some(wish) => out.push(wish),
+                    None => context.send_viewport_cmd(egui::ViewportCommand::Close),
+                }
+            }
+            if ui.button("Cancel").clicked() {
+                out.push(Message::Stay);
+            }
+        });
+    });
+    if modal.should_close() {
+        out.push(Message::Stay);
     }
 }
 
@@ -119,6 +150,9 @@ fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Out
         done = edit.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if !question.saves {
             entries(ui, &mut path, &mut done);
+            if !recent.is_empty() {
+                ui.weak("opened lately");
+            }
             for file in recent {
                 if ui.link(file.display().to_string()).clicked() {
                     path = file.display().to_string();
@@ -126,8 +160,14 @@ fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Out
                 }
             }
         }
+        if question.saves && std::path::Path::new(&path).is_file() {
+            ui.label(egui::RichText::new("this file is there already and will be replaced").color(ui.visuals().warn_fg_color));
+        }
         ui.horizontal(|ui| {
             done |= ui.button(if question.saves { "Save here" } else { "Open this" }).clicked();
+            if ui.button("Browse...").on_hover_text("the desktop's own file dialog").clicked() {
+                out.push(Message::Browse);
+            }
             open = !ui.button("Cancel").clicked();
         });
     });

@@ -47,6 +47,12 @@ fn groups() -> &'static [Group] {
     &GROUPS
 }
 
+/// What the sections are called, top to bottom.
+#[cfg(test)]
+pub fn section_names() -> Vec<&'static str> {
+    groups().iter().map(Group::title).collect()
+}
+
 /// Whether a key is of the elements of a list.
 fn is_element(key: &str) -> bool {
     keys().iter().any(|(list, kind)| *kind == Kind::Tables && key.strip_prefix(list).is_some_and(|rest| rest.starts_with('.')))
@@ -58,19 +64,23 @@ struct Group {
     keys: Vec<(&'static str, Kind)>,
 }
 
+impl Group {
+    fn title(&self) -> &'static str {
+        if self.name.is_empty() { "general" } else { self.name }
+    }
+}
+
 fn section(ui: &mut Ui, document: &Document, group: &Group, out: &mut Outbox) {
     let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
     let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
-    let group_name = group.name;
-    let name = if group_name.is_empty() { "general" } else { group_name };
-    let mut title = RichText::new(name).strong();
+    let mut title = RichText::new(group.title()).strong();
     if wrong {
         title = title.color(ui.visuals().error_fg_color);
     } else if changed {
         title = title.color(ui.visuals().hyperlink_color);
     }
-    let open = matches!(group_name, "camera.lens" | "camera.shutter" | "camera.photometric");
-    egui::CollapsingHeader::new(title).id_salt(group_name).default_open(open).show(ui, |ui| {
+    let open = matches!(group.name, "camera.lens" | "camera.shutter" | "camera.photometric");
+    egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
         for (key, kind) in &group.keys {
             match kind {
                 Kind::Tables => lists::show(ui, document, key, out),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, VLine};
 
+use super::widgets::choice;
 use crate::{
     message::{Message, Outbox},
     series::{Channel, Series},
@@ -24,6 +25,19 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.data_mut(|data| data.insert_temp(id, series.clone()));
         series
     });
+    let mut view = state.view.clone();
+    ui.horizontal(|ui| {
+        for (errors, text, tip) in
+            [(false, "values", "the log and the tracker"), (true, "errors", "the tracker less the log, where there is a log")]
+        {
+            if choice(ui, view.plot_errors == errors, text, &format!("plot {text}"), tip).clicked() {
+                view.plot_errors = errors;
+            }
+        }
+    });
+    if view != state.view {
+        out.push(Message::View(view));
+    }
     let cursor_s = series.start_s + state.timeline.seconds(state.timeline.frame);
     for channel in &series.channels {
         plot(ui, state, channel, cursor_s, series.start_s, out);
@@ -41,16 +55,27 @@ fn plot(ui: &mut Ui, state: &State, channel: &Channel, cursor_s: f64, start_s: f
         .allow_scroll(false)
         .link_axis(egui::Id::unique("flight time"), [true, false])
         .link_cursor(egui::Id::unique("flight time"), [true, false]);
-    let plot = if channel.lines.len() > 1 { plot.legend(Legend::default().position(Corner::LeftTop).background_alpha(0.5)) } else { plot };
+    let errors = channel.error.as_ref().filter(|_| state.view.plot_errors);
+    let plot = if channel.lines.len() > 1 && errors.is_none() {
+        plot.legend(Legend::default().position(Corner::LeftTop).background_alpha(0.5))
+    } else {
+        plot
+    };
     let colors = [Color32::from_rgb(150, 150, 150), Color32::from_rgb(90, 180, 250), Color32::from_rgb(250, 150, 60)];
+    let cursor = ui.visuals().strong_text_color();
     let shown = plot.show(ui, |ui| {
-        for ((name, points), color) in channel.lines.iter().zip(colors) {
-            ui.line(Line::new(*name, PlotPoints::new(points.clone())).color(color));
+        match errors {
+            Some(errors) => ui.line(Line::new("error", PlotPoints::new(errors.clone())).color(colors[2])),
+            None => {
+                for ((name, points), color) in channel.lines.iter().zip(colors) {
+                    ui.line(Line::new(*name, PlotPoints::new(points.clone())).color(color));
+                }
+            }
         }
         if let Some(limit) = channel.limit {
             ui.hline(HLine::new("", limit).color(Color32::from_rgb(220, 70, 60)));
         }
-        ui.vline(VLine::new("", cursor_s).color(Color32::WHITE));
+        ui.vline(VLine::new("", cursor_s).color(cursor));
         ui.pointer_coordinate()
     });
     if shown.response.clicked()

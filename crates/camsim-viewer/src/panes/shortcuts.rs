@@ -66,7 +66,7 @@ fn view(state: &State, change: impl FnOnce(&mut View)) -> Option<Message> {
 
 /// Keys go to text that is being typed, or to windows that are open, first.
 pub fn listen(context: &Context, state: &State, out: &mut Outbox) {
-    if context.egui_wants_keyboard_input() || state.question.is_some() || state.dropped_picture.is_some() {
+    if context.egui_wants_keyboard_input() || state.question.is_some() || state.dropped_picture.is_some() || state.leaving.is_some() {
         return;
     }
     for shortcut in SHORTCUTS {

@@ -1,9 +1,12 @@
 //! The timeline: play, scrub, loop, and when the rows of the frame are exposed.
 
-use camsim_core::shutter::Shutter;
-use eframe::egui::{self, Color32, Pos2, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use std::sync::Arc;
 
-use super::widgets::named;
+use camsim_core::shutter::Shutter;
+use camsim_io::load::Loaded;
+use eframe::egui::{self, Color32, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+
+use super::widgets::{fixed, named, signed};
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -59,7 +62,10 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     if time.on_hover_text("from the beginning of the window; click to type a time").changed() {
         out.push(Message::Seek(timeline.frame_at(seconds)));
     }
-    ui.label(format!("frame {} of {}", timeline.frame, timeline.frames));
+    ui.label(format!("of {last_s:.2} s"));
+    let flight = state.heard.stamp_s(timeline.frame).map_or_else(String::new, |t_s| format!(", flight time {} s", fixed(t_s, 3)));
+    ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames))
+        .on_hover_text("frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row");
 }
 
 fn loop_controls(ui: &mut Ui, timeline: &Timeline, changed: &mut Timeline) {
@@ -95,8 +101,13 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
         let span = Rect::from_x_y_ranges(x_of(from).max(inner.left())..=x_of(to).min(inner.right()).max(x_of(from) + 1.0), inner.y_range());
         painter.rect_filled(span, 0.0, ui.visuals().warn_fg_color.gamma_multiply(0.6));
     });
-    for frame in repaired(state) {
-        painter.vline(x_of(frame), inner.y_range(), Stroke::new(1.0, ui.visuals().error_fg_color));
+    let mut marked = f32::NEG_INFINITY;
+    for x in repaired(state).map(x_of) {
+        // Of thousands side by side a line a point is enough.
+        if x >= marked + 1.0 {
+            painter.vline(x, inner.y_range(), Stroke::new(1.0, ui.visuals().error_fg_color));
+            marked = x;
+        }
     }
     let x = x_of(timeline.frame as f64);
     painter.vline(x, rect.y_range(), Stroke::new(2.0, ui.visuals().strong_text_color()));
@@ -130,12 +141,15 @@ fn gaps(state: &State, mut mark: impl FnMut(f64, f64)) {
     wide.take(MOST_GAPS).for_each(|pair| mark(frame_at(pair[0].t_s), frame_at(pair[1].t_s)));
 }
 
-/// Frames at rows of the log that were repaired, the first few of each kind.
-fn repaired(state: &State) -> Vec<f64> {
-    let Some(loaded) = &state.heard.loaded else { return Vec::new() };
-    let (sequence, last) = (&loaded.sequence, state.timeline.last() as f64);
-    let frames = loaded.log.report.repaired_s.iter().map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps);
-    frames.filter(|frame| (0.0..=last).contains(frame)).collect()
+/// Frames at rows of the log that were repaired, in order.
+fn repaired(state: &State) -> impl Iterator<Item = f64> + '_ {
+    let last = state.timeline.last() as f64;
+    let of = |loaded: &'_ Arc<Loaded>| {
+        let sequence = loaded.sequence.clone();
+        move |t_s: &f64| (t_s - sequence.start_s) * sequence.scenario.camera.fps
+    };
+    let frames = state.heard.loaded.iter().flat_map(move |loaded| loaded.log.report.repaired_s.iter().map(of(loaded)));
+    frames.filter(move |frame| (0.0..=last).contains(frame))
 }
 
 fn log_report(ui: &mut Ui, state: &State) {
@@ -175,8 +189,9 @@ fn row_times(ui: &mut Ui, state: &State) {
         painter.line_segment(ends, Stroke::new((rect.height() / steps as f32).max(1.0), exposed));
     }
     painter.vline(x_of(0.0), rect.y_range(), Stroke::new(1.5, Color32::from_rgb(220, 70, 60)));
-    let text = format!("{:+.1} to {:+.1} ms", 1e3 * first_s, 1e3 * last_s);
-    let at: Pos2 = rect.right_top() + vec2(-4.0, 2.0);
+    let text = format!("{} to {} ms", signed(1e3 * first_s, 1), signed(1e3 * last_s, 1));
+    // Left of the next frame's line.
+    let at = pos2(x_of(period_s).min(rect.right()) - 4.0, rect.top() + 2.0);
     painter.text(at, egui::Align2::RIGHT_TOP, text, egui::FontId::proportional(11.0), ui.visuals().text_color());
     response
         .on_hover_text("each row's exposure about the frame's stamp (red), with the periods of the frames beside it; time to the right");

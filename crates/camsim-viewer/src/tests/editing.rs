@@ -6,13 +6,8 @@ use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use toml::Value;
 
-use super::harness::{Window, demo, has, shown};
+use super::harness::{Window, demo, has, send, shown};
 use crate::{engine::Size, message::Message};
-
-fn send(window: &mut Window, message: Message) {
-    let context = window.harness.ctx.clone();
-    window.state_mut().apply(message, &context);
-}
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]

@@ -6,10 +6,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use eframe::egui;
+use eframe::{egui, egui_wgpu::RendererOptions};
 use egui_kittest::{
     Harness, SnapshotOptions,
     kittest::{NodeT, Queryable},
+    wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup},
 };
 
 use crate::{
@@ -17,6 +18,7 @@ use crate::{
     engine::{Size, Wanted},
     export::Exporter,
     settings::Settings,
+    sheet,
     state::State,
 };
 
@@ -47,9 +49,21 @@ impl Window {
     }
 
     pub fn with(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2]) -> Self {
+        Self::drawn(scenario, exporter, size, true)
+    }
+
+    /// With pictures drawn by their own pipeline, as in a window of eframe's, or by egui.
+    pub fn drawn(scenario: Option<PathBuf>, exporter: Option<Exporter>, size: [f32; 2], by_own_pipeline: bool) -> Self {
         let mut start = Some((scenario, exporter));
+        // egui's predictable filter takes the nearest texel also where a picture is made smaller; a window of eframe's does not.
+        let of_window = RendererOptions { dithering: false, ..RendererOptions::default() };
+        let render = create_render_state(default_wgpu_setup(), if by_own_pipeline { RendererOptions::PREDICTABLE } else { of_window });
+        let of_window = render.clone();
         let show = move |ui: &mut egui::Ui, viewer: &mut Option<Viewer>| {
             if let Some((scenario, exporter)) = start.take() {
+                if by_own_pipeline {
+                    sheet::register(ui.ctx(), &of_window);
+                }
                 *viewer = Some(Viewer::new(ui.ctx(), scenario, Settings::default(), exporter));
             }
             // What eframe does by clearing.
@@ -57,7 +71,7 @@ impl Window {
             viewer.as_mut().expect("made in the first pass").show(ui);
         };
         let builder = Harness::builder().with_size(size).with_step_dt(0.02).with_theme(egui::Theme::Dark);
-        let harness = builder.wgpu().build_ui_state(show, None);
+        let harness = builder.renderer(WgpuTestRenderer::from_render_state(render)).build_ui_state(show, None);
         let (sender, repaints) = channel();
         harness.ctx.set_request_repaint_callback(move |_| {
             // The window may be gone.
@@ -161,4 +175,10 @@ pub fn shown(state: &State) -> Option<&Wanted> {
 /// Whether a node of that name is there.
 pub fn has(window: &Window, label: &str) -> bool {
     window.harness.query_all_by_label(label).next().is_some_and(|node| !node.accesskit_node().is_hidden())
+}
+
+/// What a pane would wish.
+pub fn send(window: &mut Window, message: crate::message::Message) {
+    let context = window.harness.ctx.clone();
+    window.state_mut().apply(message, &context);
 }

@@ -7,13 +7,8 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::DVec2;
 
-use super::harness::{Window, demo, has, pattern};
+use super::harness::{Window, demo, has, pattern, send};
 use crate::{message::Message, motion, view::Tab};
-
-fn send(window: &mut Window, message: Message) {
-    let context = window.harness.ctx.clone();
-    window.state_mut().apply(message, &context);
-}
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]

@@ -43,7 +43,13 @@ fn the_picture_on_show_is_what_render_writes() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn at_one_point_a_pixel_the_screen_has_the_pictures_own_codes() {
-    let mut window = Window::with(Some(pattern()), None, [1600.0, 1000.0]);
+    for by_own_pipeline in [true, false] {
+        let mut window = Window::drawn(Some(pattern()), None, [1600.0, 1000.0], by_own_pipeline);
+        codes_on_the_screen(&mut window);
+    }
+}
+
+fn codes_on_the_screen(window: &mut Window) {
     window.settle();
     window.click("1:1");
     // The middle of the picture on the middle of the pane may lie between two points of the screen.
@@ -63,6 +69,33 @@ fn at_one_point_a_pixel_the_screen_has_the_pictures_own_codes() {
         }
     }
     assert_eq!(same, all, "pixels with the codes of the picture");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn both_ways_of_drawing_agree_at_any_zoom() {
+    let [own, of_egui] = [true, false].map(|by_own_pipeline| {
+        let mut window = Window::drawn(Some(pattern()), None, [1000.0, 700.0], by_own_pipeline);
+        window.settle();
+        // Invalid pixels show what is behind them.
+        window.state_mut().view.overlays.invalid = true;
+        let mut screens = Vec::new();
+        for (compare, zoom) in [(Compare::Single, Some(0.4)), (Compare::Wipe, Some(3.0)), (Compare::SideBySide, Some(17.0))] {
+            window.state_mut().view = View { compare, zoom, centre: [0.31, 0.62], b: Stage::Lens, ..window.state().view.clone() };
+            window.settle();
+            window.step();
+            let pane = window.harness.get_by_label("picture").rect();
+            let [x, y, width, height] = [pane.left(), pane.top(), pane.width(), pane.height()].map(|v| v.round() as u32);
+            screens.push(image::imageops::crop_imm(&window.picture(), x, y, width, height).to_image());
+        }
+        screens
+    });
+    for (step, (own, of_egui)) in own.iter().zip(&of_egui).enumerate() {
+        // Where a texel ends between two pixels of the screen either may show it; smooth ones are rounded otherwise.
+        let far = |(a, b): &(&image::Rgba<u8>, &image::Rgba<u8>)| (0..3).any(|k| a.0[k].abs_diff(b.0[k]) > 2);
+        let differing = own.pixels().zip(of_egui.pixels()).filter(far).count();
+        assert!(differing * 500 < own.pixels().len(), "{differing} of {} in step {step}", own.pixels().len());
+    }
 }
 
 #[test]

@@ -1,10 +1,11 @@
 //! Where pixels lie on the screen, and the hand that moves them.
 
-use eframe::egui::{self, Color32, Painter, Pos2, Rect, Response, TextureHandle, Ui, Vec2, pos2, vec2};
+use eframe::egui::{self, Painter, Pos2, Rect, Response, Ui, Vec2, pos2, vec2};
 
 use crate::{
     engine::preview_factor,
     message::{Message, Outbox},
+    sheet::{Place, Sheet},
     state::State,
     view::View,
 };
@@ -51,10 +52,9 @@ impl Placement {
         Rect::from_min_size(self.origin, vec2((size_px[0] * factor) as f32, (size_px[1] * factor) as f32) * self.scale)
     }
 
-    /// Draws a texture there.
-    pub fn image(&self, painter: &Painter, texture: &TextureHandle, size_px: [u32; 2]) {
-        let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        painter.image(texture.id(), self.picture_rect(size_px), all, Color32::WHITE);
+    /// Draws a picture there.
+    pub fn image(&self, painter: &Painter, place: Place, sheet: &Sheet, size_px: [u32; 2]) {
+        sheet.draw(painter, place, self.picture_rect(size_px));
     }
 
     /// Where a place of the picture lies; integers are pixel centres.

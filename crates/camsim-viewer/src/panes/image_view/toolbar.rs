@@ -27,15 +27,19 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.separator();
         zoom(ui, state, &mut view);
     });
+    let one = view.compare == Compare::Single;
     ui.horizontal_wrapped(|ui| {
         stages(ui, "A", &mut view.a);
-        if view.compare != Compare::Single {
+        if one {
             ui.separator();
-            stages(ui, "B", &mut view.b);
+            overlays(ui, &mut view);
         }
-        ui.separator();
-        overlays(ui, &mut view);
     });
+    // One below the other, each stage of B below that of A.
+    if !one {
+        ui.horizontal_wrapped(|ui| stages(ui, "B", &mut view.b));
+        ui.horizontal_wrapped(|ui| overlays(ui, &mut view));
+    }
     if view != state.view {
         out.push(Message::View(view));
     }

@@ -1,5 +1,7 @@
 //! An editor for each kind of value.
 
+mod names;
+
 use camsim_io::scenario_file::Kind;
 use eframe::egui::{self, Response, Role, Ui};
 use toml::Value;
@@ -26,10 +28,10 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Par
         Kind::NumberOr(words) => number_or(ui, key, value, param, words, false, out),
         Kind::CountOr(_, words) => number_or(ui, key, value, param, words, true, out),
         Kind::Numbers(count) => optional(ui, key, value, document, param, count, out),
-        Kind::Counts(count, _) => numbers(ui, key, value, param, count, true, out),
-        Kind::NumbersOr(count, word) => numbers_or(ui, key, value, param, count, word, out),
-        Kind::NumberList => list(ui, key, value, param, out),
-        Kind::Path => path(ui, key, value),
+        Kind::Counts(count, _) => numbers(ui, document, key, value, param, count, true, out),
+        Kind::NumbersOr(count, word) => numbers_or(ui, document, key, value, param, count, word, out),
+        Kind::NumberList => list(ui, document, key, value, param, out),
+        Kind::Path => path(ui, document, key, value),
         Kind::Flag => flag(ui, key, value),
         Kind::Word(words) => word(ui, key, value, words),
         Kind::Words(words) => several(ui, key, value, words),
@@ -50,10 +52,13 @@ fn as_f64(value: &Value) -> f64 {
 }
 
 /// A value to drag or to type.
-fn drag(ui: &mut Ui, name: &str, value: f64, param: &Param, whole: bool, out: &mut Outbox) -> Option<(f64, bool)> {
+fn drag(ui: &mut Ui, name: &str, label: &str, value: f64, param: &Param, whole: bool, out: &mut Outbox) -> Option<(f64, bool)> {
     let mut changed = value;
     let [low, high] = param.range;
     let mut editor = egui::DragValue::new(&mut changed).speed(param.speed).range(low..=high).clamp_existing_to_range(false);
+    if !label.is_empty() {
+        editor = editor.prefix(format!("{label} "));
+    }
     editor = if whole { editor.max_decimals(0) } else { editor.max_decimals(7) };
     let response = ui.add(editor).on_hover_text(format!(
         "{}{}",
@@ -83,7 +88,7 @@ fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: b
         return add.clicked().then(|| to_value(first_value(param), whole)).and_then(once);
     };
     let edit =
-        drag(ui, key, as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
+        drag(ui, key, "", as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
     if matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg") && remove(ui, key) {
         return Some(Edit { value: None, ongoing: false });
     }
@@ -114,11 +119,23 @@ fn number_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, words
     if value.is_str() { None } else { number(ui, key, Some(value), param, whole, out) }
 }
 
-fn numbers(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, count: usize, whole: bool, out: &mut Outbox) -> Option<Edit> {
+fn numbers(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    value: Option<&Value>,
+    param: &Param,
+    count: usize,
+    whole: bool,
+    out: &mut Outbox,
+) -> Option<Edit> {
+    let labels = names::of(key, document.scenario.camera.lens.model);
     let array = value?.as_array()?;
     let mut edit = None;
     for (at, element) in array.iter().take(count).enumerate() {
-        if let Some((number, ongoing)) = drag(ui, &format!("{key}[{at}]"), as_f64(element), param, whole, out) {
+        if let Some((number, ongoing)) =
+            drag(ui, &format!("{key}[{at}]"), labels.get(at).unwrap_or(&""), as_f64(element), param, whole, out)
+        {
             let mut changed = array.clone();
             changed[at] = to_value(number, whole);
             edit = Some(Edit { value: Some(Value::Array(changed)), ongoing });
@@ -139,7 +156,7 @@ fn optional(
 ) -> Option<Edit> {
     let may_be_left_out = matches!(key.rsplit('.').next(), Some("window_s" | "principal_point_px"));
     if value.is_some() {
-        let edit = numbers(ui, key, value, param, count, false, out);
+        let edit = numbers(ui, document, key, value, param, count, false, out);
         return if may_be_left_out && remove(ui, key) { Some(Edit { value: None, ongoing: false }) } else { edit };
     }
     let add = ui.button("set").on_hover_text(param.tip);
@@ -153,20 +170,29 @@ fn optional(
     add.clicked().then(|| Value::Array(start.into_iter().map(Value::Float).collect())).and_then(once)
 }
 
-fn numbers_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, count: usize, word: &str, out: &mut Outbox) -> Option<Edit> {
+fn numbers_or(
+    ui: &mut Ui,
+    document: &Document,
+    key: &str,
+    value: Option<&Value>,
+    param: &Param,
+    count: usize,
+    word: &str,
+    out: &mut Outbox,
+) -> Option<Edit> {
     let is_word = value.is_some_and(Value::is_str);
     let response = ui.selectable_label(is_word, word).on_hover_text(param.tip);
     named(&response, Role::Button, &format!("{key}: {word}"));
     if response.clicked() {
         return once(if is_word { Value::Array(vec![Value::Float(0.0); count]) } else { Value::String(word.into()) });
     }
-    if is_word { None } else { numbers(ui, key, value, param, count, false, out) }
+    if is_word { None } else { numbers(ui, document, key, value, param, count, false, out) }
 }
 
 /// As many numbers as one likes.
-fn list(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, out: &mut Outbox) -> Option<Edit> {
+fn list(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>, param: &Param, out: &mut Outbox) -> Option<Edit> {
     let array = value?.as_array()?;
-    let mut edit = numbers(ui, key, value, param, array.len(), false, out);
+    let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
     let (more, less) = (ui.small_button("+").on_hover_text("one more"), ui.small_button("-").on_hover_text("one less"));
     named(&more, Role::Button, &format!("one more of {key}"));
     named(&less, Role::Button, &format!("one less of {key}"));
@@ -180,22 +206,35 @@ fn list(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, out: &mut 
     edit
 }
 
-/// A path is taken when it has been typed to the end: half a path is no file.
-fn path(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {
+/// A path is taken when it has been typed to the end: half a path is no file. Files beside the scenario go by their names, as in its file.
+fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> Option<Edit> {
     let present = value.and_then(Value::as_str).unwrap_or_default();
     let id = egui::Id::unique(("path", key));
-    let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
+    let (beside, elsewhere) = (document.beside(present), shortened(present));
+    let resting = if beside.len() < present.len() { beside.clone() } else { elsewhere };
+    let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or(resting);
     let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).on_hover_text(present);
     named(&response, Role::TextInput, key);
+    if response.gained_focus() {
+        ui.data_mut(|data| data.insert_temp(id, beside));
+        return None;
+    }
     if response.has_focus() {
         ui.data_mut(|data| data.insert_temp(id, text));
         return None;
     }
-    ui.data_mut(|data| data.remove::<String>(id));
-    if !response.lost_focus() || text == present {
+    ui.data_mut(|data| data.remove_temp::<String>(id))?;
+    // A field that goes out of sight in the middle of it has not been typed to the end.
+    if !response.lost_focus() || text == beside {
         return None;
     }
-    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), ongoing: false })
+    Some(Edit { value: (!text.is_empty()).then(|| Value::String(document.resolved(&text))), ongoing: false })
+}
+
+/// The end of a path: it tells more than its beginning.
+fn shortened(path: &str) -> String {
+    let name = std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned());
+    name.filter(|name| name.len() < path.len()).map_or_else(|| path.to_owned(), |name| format!(".../{name}"))
 }
 
 fn flag(ui: &mut Ui, key: &str, value: Option<&Value>) -> Option<Edit> {

@@ -1,0 +1,59 @@
+//! What would lose changes is asked about.
+
+use toml::Value;
+
+use super::harness::{Window, has, pattern, send};
+use crate::{message::Message, state::Leaving};
+
+fn changed() -> Window {
+    let mut window = Window::open(Some(pattern()));
+    window.settle();
+    send(&mut window, Message::Set("camera.shutter.exposure_ms".into(), Some(Value::Float(2.0)), false));
+    window.settle();
+    window
+}
+
+fn exposure_ms(window: &Window) -> f64 {
+    window.state().document.as_ref().expect("open").scenario.camera.shutter.exposure_ms
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn opening_another_scenario_asks_before_changes_are_lost() {
+    let mut window = changed();
+    for wish in [Message::Open(pattern()), Message::Drop(pattern())] {
+        send(&mut window, wish);
+        (0..3).for_each(|_| window.step());
+        assert_eq!(exposure_ms(&window), 2.0, "nothing is lost yet");
+        window.click("Cancel");
+        assert_eq!((window.state().leaving.clone(), exposure_ms(&window)), (None, 2.0));
+    }
+    send(&mut window, Message::Open(pattern()));
+    (0..3).for_each(|_| window.step());
+    window.click("Open without saving");
+    assert_eq!((window.state().leaving.clone(), exposure_ms(&window)), (None, 8.0));
+    send(&mut window, Message::Open(pattern()));
+    assert_eq!(window.state().leaving, None, "without changes nothing is asked");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn closing_asks_once() {
+    use eframe::egui::{ViewportCommand, ViewportEvent};
+    let mut window = changed();
+    let close = |window: &mut Window| {
+        window.harness.input_mut().viewports.entry(eframe::egui::ViewportId::ROOT).or_default().events.push(ViewportEvent::Close);
+        window.step();
+        window.harness.input_mut().viewports.entry(eframe::egui::ViewportId::ROOT).or_default().events.clear();
+        let output = window.harness.output();
+        output.viewport_output.values().flat_map(|viewport| &viewport.commands).any(|command| *command == ViewportCommand::CancelClose)
+    };
+    assert!(close(&mut window), "held back");
+    assert_eq!(window.state().leaving, Some(Leaving::Closing));
+    (0..3).for_each(|_| window.step());
+    assert!(has(&window, "Close without saving"));
+    assert!(!close(&mut window), "the second wish is obeyed");
+    window.click("Cancel");
+    send(&mut window, Message::Undo);
+    assert!(!close(&mut window), "without changes nothing is asked");
+}
