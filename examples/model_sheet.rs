@@ -6,6 +6,8 @@
 //!
 //! Models stand in the order of the list, six a row; those with animations as they are at SECONDS (0.6).
 
+#![allow(clippy::print_stdout, reason = "the list is half of what this program is for")]
+
 use std::{
     error::Error,
     path::{Path, PathBuf},

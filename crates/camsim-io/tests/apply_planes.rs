@@ -198,7 +198,7 @@ fn sources_are_those_of_rays_into_the_scene() {
     }
     let worst = clear.iter().copied().fold(0.0, f64::max);
     let right = near.iter().filter(|error| **error < 0.05).count() as f64 / near.len() as f64;
-    println!(
+    eprintln!(
         "away from silhouettes {} px: RMS {:.6}, worst {worst:.6}; beside them {}: RMS {:.3}, {:.1} % within 0.05; hidden {hidden}, outside {outside}",
         clear.len(),
         rms(&clear),
@@ -242,7 +242,7 @@ fn blur_is_the_mean_of_rays_over_the_exposure() {
             if seen.iter().all(|(panel, _)| *panel == seen[0].0) { one.push(error) } else { mixed.push(error) }
         }
     }
-    println!("one surface {}: RMS {:.5}; several {}: RMS {:.3}", one.len(), rms(&one), mixed.len(), rms(&mixed));
+    eprintln!("one surface {}: RMS {:.5}; several {}: RMS {:.3}", one.len(), rms(&one), mixed.len(), rms(&mixed));
     assert!(one.len() > 10_000 && mixed.len() > 300, "{} {}", one.len(), mixed.len());
     assert!(rms(&one) < 0.05, "{}", rms(&one));
     // Each surface's share of the exposure is known to about one sample, and to half a texel of its silhouette.

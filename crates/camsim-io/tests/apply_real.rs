@@ -138,7 +138,7 @@ fn a_frame_carried_to_the_place_of_another_is_that_other() {
         let file = set.read(&data, folder.path(), from, "");
         let unmoved = Pipeline::new(&still, &file.frame, &file.motion, &Settings::default()).unwrap().render(None);
         let (_, by_chance, _) = agreement(&unmoved, &own);
-        println!(
+        eprintln!(
             "{} {from} -> {to}: {both} px with depth in both, {:.1} % agree ({:.1} % unmoved), colour {color:.4}",
             set.folder,
             100.0 * agree,
@@ -165,7 +165,7 @@ fn silhouettes_hold_in_every_frame() {
         let spec = set.camera(ShutterSpec { readout_ms: 100.0, exposure_ms: 10.0, ..ShutterSpec::default() });
         let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &Settings::default()).unwrap();
         let (own, foreign, holes) = sources(&pipeline, &spec, &file);
-        println!("{} {number}: {own} sources on a surface of their own, {foreign} between two, {holes} in holes", set.folder);
+        eprintln!("{} {number}: {own} sources on a surface of their own, {foreign} between two, {holes} in holes", set.folder);
         // Others stand in for what was hidden, beside silhouettes: 0.4 % of the first Kinect frame.
         assert!(own > 50_000 && foreign * 50 < own, "{} {number}: {own} {foreign}", set.folder);
         assert_eq!(holes > 0, file.without_depth > 0.0, "{} {number}", set.folder);
