@@ -6,18 +6,15 @@
 use std::sync::{Arc, Mutex};
 
 use glam::DVec2;
-use serde::Serialize;
 
 use crate::{
     camera::{CameraModel, ZoomTable},
     frame::RowRecord,
     mount::CameraPath,
-    pose::CameraPose,
-    scenario::{Channel, Preset, QualitySpec},
-    scene::LevelTolerance,
+    scenario::Channel,
     sequence::Sequence,
     shutter::{LinesAxis, Shutter},
-    temporal::{IdealGeometry, TapStage, displacement::Twist},
+    temporal::IdealGeometry,
 };
 
 mod borders;
@@ -29,6 +26,7 @@ mod edges;
 mod error;
 mod exposure;
 mod forced;
+mod frame_plan;
 mod grain;
 mod holes;
 mod keys;
@@ -57,6 +55,7 @@ pub use contours::Contours;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
+pub use frame_plan::{FramePlan, Motion, Skip};
 pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
@@ -68,141 +67,8 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
-/// Part of the terrain's level of detail that models get: they are borders all over, of other colours than what is behind them.
-const MODEL_SHARE: f64 = 0.25;
-/// Part of `quality.max_error_px` that their displacement may take by parallax.
-const MODEL_PARALLAX_SHARE: f64 = 0.1;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
-
-/// What moves within the frame: bounds that the choices rest on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Motion {
-    /// Nearest surface in view of the key camera, planar depth, a lower bound, metres; infinite with nothing in view.
-    pub nearest_m: f64,
-    /// Farthest the optical centre gets from the key position in the frame's window, metres.
-    pub travel_m: f64,
-    /// Largest rotation from the key attitude, radians.
-    pub rotation_rad: f64,
-    /// Bound on the parallax of any pixel, ideal pixels.
-    pub parallax_px: f64,
-    /// Bound on the displacement by rotation, ideal pixels.
-    pub rotation_px: f64,
-    /// Longest blur path found, ideal pixels.
-    pub blur_px: f64,
-    /// Bound on how far a straight path misses the curved one, ideal pixels.
-    pub blur_sagitta_px: f64,
-}
-
-/// Work that this frame does not need.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Skip {
-    /// What is left out.
-    pub what: &'static str,
-    /// Why nothing is lost.
-    pub reason: String,
-}
-
-/// Everything that rendering one frame takes.
-#[derive(Clone, Debug)]
-pub struct FramePlan {
-    /// Frame number.
-    pub frame: u64,
-    /// Whose methods.
-    pub preset: Preset,
-    /// Stamp t_i, path time, seconds.
-    pub stamp_s: f64,
-    /// First and last instant that the frame sees, path time, seconds.
-    pub window_s: [f64; 2],
-    /// Whether the window reaches outside the log.
-    pub extrapolated: bool,
-    /// Zoom value, for a zoom lens.
-    pub zoom: Option<f64>,
-    /// The output camera at this zoom.
-    pub camera: Arc<CameraModel>,
-    /// Row timing.
-    pub shutter: Shutter,
-    /// Middle of the window, path time, seconds.
-    pub key_s: f64,
-    /// The pose then: the camera that source coordinates are given in, and that of the ideal frame where there is only one.
-    pub key_pose: CameraPose,
-    /// The camera's motion then, in its own axes: all that the constant-twist solvers know of it.
-    pub key_twist: Twist,
-    /// Instants and poses of the ideal frames, in order of time.
-    pub keys: Vec<KeyFrame>,
-    /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
-    pub shared_by: Option<[u64; 2]>,
-    /// Why there is no other.
-    pub alone: Option<&'static str>,
-    /// Pixels of each ideal frame.
-    pub ideal: IdealGeometry,
-    /// Lens inverse.
-    pub ray: RayStage,
-    /// Temporal inverse.
-    pub temporal: TemporalStage,
-    /// Gather; `None` is one instant.
-    pub blur: Option<BlurStage>,
-    /// Pixels that see a silhouette.
-    pub edges: EdgeStage,
-    /// What reads the surfaces' pictures for the ideal frame.
-    pub surface_reads: SurfaceReads,
-    /// What reads the ideal frame for each sample.
-    pub taps: TapStage,
-    /// Fog after the gather (the paper's); otherwise it is in the ideal frame.
-    pub linear_fog: Option<LinearFog>,
-    /// Whether depth and coordinates are wanted beside the picture.
-    pub truth: bool,
-    /// What the choices rest on.
-    pub motion: Motion,
-    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px`, or less where the parallax within the
-    /// frame would turn the difference into an error of the coordinates.
-    pub terrain_error_px: f64,
-    /// How far the pixels' sources will be off.
-    pub predicted: Predicted,
-    /// What is not done.
-    pub skipped: Vec<Skip>,
-    /// Time that it is expected to take, roughly, in bilinear reads of every output pixel: what plans are compared by.
-    pub price: f64,
-}
-
-impl FramePlan {
-    /// Whether the one ideal frame was taken at another instant than the middle of the window.
-    #[must_use]
-    pub fn looks_from_elsewhere(&self) -> bool {
-        matches!(self.keys.as_slice(), [key] if key.t_s != self.key_s)
-    }
-
-    /// Pose of the ideal frame's camera; of several the middle one's.
-    #[must_use]
-    pub fn ideal_pose(&self) -> CameraPose {
-        self.keys.get(self.keys.len() / 2).map_or(self.key_pose, |key| key.pose)
-    }
-
-    /// How far the surfaces of models may be from where they are, in the ideal frames: frames that share one agree on it.
-    #[must_use]
-    pub fn model_tolerance(&self, quality: &QualitySpec) -> LevelTolerance {
-        LevelTolerance {
-            focal_px: self.ideal.focal_px.max_element(),
-            tangents: self.tangents(),
-            error_px: MODEL_SHARE * self.terrain_error_px,
-            travel_m: self.motion.travel_m,
-            parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
-        }
-    }
-
-    /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.
-    #[must_use]
-    pub fn tangents(&self) -> [f64; 4] {
-        self.ideal.tangents()
-    }
-
-    /// How much of the frame's window has gone by at an instant, path time, seconds: 0 to 1 within it.
-    #[must_use]
-    pub fn window_share(&self, t_s: f64) -> f64 {
-        let [first_s, last_s] = self.window_s;
-        if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 }
-    }
-}
 
 /// Plans frames of one sequence; keeps what depends on the lens alone.
 #[derive(Debug)]

@@ -9,7 +9,10 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec2;
 
 use super::{contours::Search, probes::Probe, prospect::path_px};
-use crate::silhouette::{NEAR_PX, may_step, steps};
+use crate::{
+    silhouette::{NEAR_PX, bends, may_step, steps},
+    temporal::marks::FINE_EDGE_STEP,
+};
 
 /// Places along each of the two lines, a pixel apart.
 const PLACES: usize = 2 * NEAR_PX as usize + 1;
@@ -22,6 +25,8 @@ pub(super) struct Crossed {
     pub stairs: f64,
     /// The same of borders between meshes that touch, as a window and its wall do: depth tells nothing of them, so that rays leave them as they are.
     pub flush: f64,
+    /// The same where depth bends between them, as at a wall's foot: samples finer than a pixel find that, the middles of pixels do not.
+    pub feet: f64,
 }
 
 impl Search<'_> {
@@ -30,16 +35,17 @@ impl Search<'_> {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
-        let (mut borders, mut contrast2, mut flush2, mut depth) = (0, 0.0, 0.0, 0.0);
+        let (mut borders, mut contrast2, mut flush2, mut feet2, mut depth) = (0, 0.0, 0.0, 0.0, 0.0);
         for axis in [DVec2::X, DVec2::Y] {
             let uv = |place: f64| probe.uv + probe.uv_from_px * ((place - f64::from(NEAR_PX)) * axis);
             let meet = |place: f64| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
             let met: [_; PLACES] = std::array::from_fn(|k| meet(k as f64));
             let inverse_depths = met.map(|met| met.map_or(0.0, |met| met.depth_m.recip()));
             depth = inverse_depths[PLACES / 2];
-            let bends = |k: usize| may_step([inverse_depths[k], inverse_depths[k + 1], inverse_depths[k + 2]]);
+            let around = |k: usize| [inverse_depths[k], inverse_depths[k + 1], inverse_depths[k + 2]];
             for k in 0..PLACES - 1 {
-                let may = (k > 0 && bends(k - 1)) || (k + 2 < PLACES && bends(k));
+                let either = |is: &dyn Fn([f64; 3]) -> bool| (k > 0 && is(around(k - 1))) || (k + 2 < PLACES && is(around(k)));
+                let may = either(&may_step);
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
                 let color = |k: usize| self.surfaces.color(met[k].as_ref(), uv(k as f64).extend(1.0).length());
                 let square = || (color(k) - color(k + 1)).length_squared() / 3.0;
@@ -48,17 +54,18 @@ impl Search<'_> {
                     borders += 1;
                     contrast2 += square();
                 } else if mesh(k) != mesh(k + 1) && mesh(k) * mesh(k + 1) > 0 {
-                    flush2 += square();
+                    let side = if either(&|depths| bends(depths, FINE_EDGE_STEP)) { &mut feet2 } else { &mut flush2 };
+                    *side += square();
                 }
             }
         }
-        if borders == 0 && flush2 == 0.0 {
+        if borders == 0 && flush2 + feet2 == 0.0 {
             return Crossed::default();
         }
         let path_px = path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, depth, self.reach.camera.focal_px).1;
         let looked_at_px = 2.0 * (PLACES - 1) as f64;
         let of = |contrast2: f64| stairs(FRAC_PI_2 * contrast2 / looked_at_px * (self.gain)(probe.pixel).powi(2), path_px);
-        Crossed { borders, stairs: of(contrast2), flush: of(flush2) }
+        Crossed { borders, stairs: of(contrast2), flush: of(flush2), feet: of(feet2) }
     }
 }
 

@@ -91,6 +91,8 @@ pub(super) struct Outlook {
     squares: [f64; 2],
     /// By borders between meshes that touch, at the camera's own scale.
     flush: f64,
+    /// By those where depth bends.
+    feet: f64,
 }
 
 /// One probe near a silhouette.
@@ -133,6 +135,7 @@ impl Outlook {
             hidden_share: holes.share,
             squares: [stairs, STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip)],
             flush: over_all(&|crossed| crossed.flush),
+            feet: over_all(&|crossed| crossed.feet),
         }
     }
 
@@ -145,12 +148,15 @@ impl Outlook {
 
     /// Left as they are, with so many ideal pixels for each of the camera's.
     pub fn plain(&self, scale: f64) -> Contours {
-        self.of((self.squares[0] + self.flush) / (scale * scale) + self.squares[1])
+        self.of((self.squares[0] + self.flush + self.feet) / (scale * scale) + self.squares[1])
     }
 
     /// With rays of their own: a border is known to a part of a fine pixel.
     pub fn with_rays(&self, scale: f64, fine: u32) -> Contours {
-        self.of(RAYS_LEAVE * self.squares[0] / (scale * f64::from(fine)).powi(2) + self.flush / (scale * scale))
+        let as_they_are = (scale * scale).recip();
+        let through_samples = RAYS_LEAVE * as_they_are / f64::from(fine * fine);
+        let of_feet = if fine > 1 { through_samples } else { as_they_are };
+        self.of(through_samples * self.squares[0] + as_they_are * self.flush + of_feet * self.feet)
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -326,6 +332,14 @@ mod tests {
         assert_eq!(found.squares[0], 0.0);
         let [plain, rays] = [found.plain(2.0), found.with_rays(2.0, 2)].map(|of| of.error_dn);
         assert!((plain - rays).abs() < 1e-9 && (plain - 127.5 * found.flush.sqrt()).abs() < 1e-9, "{plain} {rays}");
+    }
+
+    #[test]
+    fn finer_samples_find_the_feet_of_walls() {
+        let feet = Outlook { share: 0.5, contrast_dn: 100.0, hidden_share: 0.0, squares: [0.0; 2], flush: 0.0, feet: 1e-4 };
+        let [plain, middles, thirds] = [feet.plain(2.0), feet.with_rays(2.0, 1), feet.with_rays(2.0, 3)].map(|of| of.error_dn);
+        assert_eq!(plain, middles);
+        assert!((thirds / plain - RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{plain} {thirds}");
     }
 
     #[test]
