@@ -211,8 +211,8 @@ fn sources_are_those_of_rays_into_the_scene() {
     // The contract is 0.05 RMS; 0.003 is measured. Over planes the sources are exact to 1e-6 (core's tests), but here colours tell them, which
     // the gather reads between pixels.
     assert!(rms(&clear) < 0.01 && worst < 0.02, "{} {worst}", rms(&clear));
-    // A wrong side of a silhouette is possible within half a texel of it, and nothing else is.
-    assert!(right > 0.6, "{right}");
+    // A wrong side of a silhouette is possible within half a texel of it, and nothing else is: of the pixels within one of it an eighth.
+    assert!(right > 0.86, "{right}");
     // What is not shown is empty; the border of the picture may fall either way in the last bit.
     assert!(wrongly_empty <= 2 && counts.outside.abs_diff(outside) <= 300 && counts.no_ray == 0, "{wrongly_empty} {counts:?} {outside}");
 }
@@ -244,7 +244,8 @@ fn blur_is_the_mean_of_rays_over_the_exposure() {
     }
     eprintln!("one surface {}: RMS {:.5}; several {}: RMS {:.3}", one.len(), rms(&one), mixed.len(), rms(&mixed));
     assert!(one.len() > 10_000 && mixed.len() > 300, "{} {}", one.len(), mixed.len());
-    assert!(rms(&one) < 0.05, "{}", rms(&one));
+    // 0.008 is measured.
+    assert!(rms(&one) < 0.012, "{}", rms(&one));
     // Each surface's share of the exposure is known to about one sample, and to half a texel of its silhouette.
-    assert!(rms(&mixed) < 0.5, "{}", rms(&mixed));
+    assert!(rms(&mixed) < 0.35, "{}", rms(&mixed));
 }

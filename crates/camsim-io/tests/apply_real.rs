@@ -128,7 +128,7 @@ fn agreement(rendered: &RenderedFrame, own: &FrameFile) -> (usize, f64, f32) {
 fn a_frame_carried_to_the_place_of_another_is_that_other() {
     let Some(data) = data() else { return };
     for (set, from, to, least, darkest) in
-        [(&RENDERED, 4, 5, 0.95, 0.02), (&RENDERED, 5, 4, 0.95, 0.02), (&KINECT, 4, 5, 0.7, 0.05), (&KINECT, 3, 4, 0.6, 0.05)]
+        [(&RENDERED, 4, 5, 0.95, 0.02), (&RENDERED, 5, 4, 0.95, 0.02), (&KINECT, 4, 5, 0.94, 0.02), (&KINECT, 3, 4, 0.86, 0.03)]
     {
         let (rendered, own) = carried(set, &data, from, to);
         let (both, agree, color) = agreement(&rendered, &own);
@@ -166,7 +166,7 @@ fn silhouettes_hold_in_every_frame() {
         let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &Settings::default()).unwrap();
         let (own, foreign, holes) = sources(&pipeline, &spec, &file);
         eprintln!("{} {number}: {own} sources on a surface of their own, {foreign} between two, {holes} in holes", set.folder);
-        // Others stand in for what was hidden, beside silhouettes: 0.4 % of the first Kinect frame.
+        // Others stand in for what was hidden, beside silhouettes: 1.3 % of the second Kinect frame, less elsewhere.
         assert!(own > 50_000 && foreign * 50 < own, "{} {number}: {own} {foreign}", set.folder);
         assert_eq!(holes > 0, file.without_depth > 0.0, "{} {number}", set.folder);
     }
