@@ -1,8 +1,8 @@
 // Counter-based noise: a pure function of (seed, frame, pixel, stream), so frames may come in any order.
 // Twin: camsim_core::noise.
 
-// Inverse normal CDF over octaves of the tail probability; built by camsim_core::noise::tail_table.
-@group(0) @binding(1) var<storage, read> noise_table: array<f32>;
+// Inverse normal CDF over octaves of the tail probability: what each segment of camsim_core::noise::tail_table begins with, and what it adds.
+@group(0) @binding(1) var<storage, read> noise_table: array<vec2<f32>>;
 
 // Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
 fn pcg4d(key: vec4<u32>) -> vec4<u32> {
@@ -29,9 +29,8 @@ fn normal_from_bits(bits: u32) -> f32 {
     let mantissa = (x << lead) & 0x7fffffu; // fraction of the octave, 23 bits
     let segment = mantissa >> 19u;
     let t = f32(mantissa & 0x7ffffu) * (1.0 / 524288.0);
-    let i = lead * 17u + segment;
-    let a = noise_table[i];
-    let value = a + t * (noise_table[i + 1u] - a);
+    let entry = noise_table[lead * 16u + segment];
+    let value = entry.x + t * entry.y;
     return select(value, -value, (bits >> 31u) == 1u);
 }
 

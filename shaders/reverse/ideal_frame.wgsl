@@ -1,6 +1,7 @@
 // Access to the ideal frame: linear colour and reversed depth d = near / z.
 @group(1) @binding(0) var ideal_color: texture_2d<f32>;
 @group(1) @binding(1) var ideal_sampler: sampler;
+@group(1) @binding(9) var depth_sampler: sampler;
 @group(1) @binding(2) var ideal_depth: texture_2d<f32>;
 
 // A number of the frame that says where the kernel goes: how often a loop turns, whether there is something to do. What follows from uniforms alone makes
@@ -46,10 +47,11 @@ fn inverse_depth(at_px: vec2<f32>) -> f32 {
     let b = around.first;
     let top = around.last;
     let t = around.t;
-    let d00 = textureLoad(ideal_depth, b, 0).x;
-    let d10 = textureLoad(ideal_depth, vec2<i32>(top.x, b.y), 0).x;
-    let d01 = textureLoad(ideal_depth, vec2<i32>(b.x, top.y), 0).x;
-    let d11 = textureLoad(ideal_depth, top, 0).x;
+    let four = textureGather(0, ideal_depth, depth_sampler, vec2<f32>(b + 1) / vec2<f32>(textureDimensions(ideal_depth)));
+    let d00 = four.w;
+    let d10 = four.z;
+    let d01 = four.x;
+    let d11 = four.y;
     let low = min(min(d00, d10), min(d01, d11));
     let high = max(max(d00, d10), max(d01, d11));
     let mixed = mix(mix(d00, d10, t.x), mix(d01, d11, t.x), t.y);

@@ -35,10 +35,11 @@ fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
     let marked = (word >> 31u) != 0u;
     let ray = lens_ray(pixel);
     use_key_of_line(pixel);
+    hold_line(pixel);
     // Without samples the list is for depth and coordinates alone.
     if (told(frame.edge_samples) > 0u && (marked || (HAS_PARALLAX && !sees_one_surface(pixel, ray)))) {
         let color = rays_color(pixel, ray);
-        emit(pixel, output_color(photometric(pixel, after_gather(ray, color), vignette_weight(pixel))));
+        emit(pixel, vec4<f32>(output_color(photometric(pixel, after_gather(ray, color), vignette_weight(pixel))), 1.0));
     }
     if (EMITS_RAYS) {
         emit_centre(pixel, ray);

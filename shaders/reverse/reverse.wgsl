@@ -14,17 +14,26 @@
 #import <slot:color>
 #import <slot:emit>
 #import <slot:edges>
+#import <slot:pixels>
 
-@compute @workgroup_size(8, 8)
-fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
-    let pixel = id.xy;
-    if (pixel.x >= frame.size_px.x || pixel.y >= frame.size_px.y) {
-        return;
-    }
+// Side of a workgroup, pixels.
+const SIDE: u32 = 8u;
+
+@compute @workgroup_size(SIDE, SIDE)
+fn reverse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    take_pixels(group.xy, local.xy);
+}
+
+fn is_in_picture(pixel: vec2<u32>) -> bool {
+    return pixel.x < frame.size_px.x && pixel.y < frame.size_px.y;
+}
+
+// R G B A of a pixel; all 0 where nothing is seen.
+fn color_of(pixel: vec2<u32>) -> vec4<f32> {
     let ray = lens_ray(pixel);
     if (!ray.valid) {
-        emit_invalid(pixel);
-        return;
+        emit_no_truth(pixel);
+        return vec4<f32>(0.0);
     }
     let weight = vignette_weight(pixel);
     var gathered = Gathered(vec4<f32>(0.0), true, array<vec2<f32>, 2>());
@@ -33,14 +42,14 @@ fn reverse(@builtin(global_invocation_id) id: vec3<u32>) {
         gathered = gather(pixel, ray);
     }
     if (!gathered.inside) {
-        emit_invalid(pixel);
-        return;
+        emit_no_truth(pixel);
+        return vec4<f32>(0.0);
     }
     if (weight > 0.0) {
         list_for_rays(pixel, ray, gathered);
     }
-    emit(pixel, output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)));
     if (EMITS_RAYS) {
         emit_truth(pixel, ray, smooth_px_at_phase(pixel, ray, coords_phase()), smooth_mid(pixel, ray));
     }
+    return vec4<f32>(output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)), 1.0);
 }

@@ -42,6 +42,14 @@ pub fn tail_table() -> Vec<f32> {
     (0..OCTAVES).flat_map(|octave| (0..=SEGMENTS).map(move |segment| at(octave, segment))).collect()
 }
 
+/// [`tail_table`] as a shader reads it: what each segment begins with and what it adds, index `16 k + s`, `s = 0..16`.
+#[must_use]
+pub fn tail_segments() -> Vec<[f32; 2]> {
+    let table = tail_table();
+    let of_octave = |octave: &[f32]| octave.windows(2).map(|ends| [ends[0], ends[1] - ends[0]]).collect::<Vec<_>>();
+    table.chunks_exact(SEGMENTS + 1).flat_map(of_octave).collect()
+}
+
 /// Standard normal from 32 random bits by interpolating [`tail_table`]; bit 31 is the sign, bits 30..8 the tail probability.
 ///
 /// Reaches about 5.5 sigma.

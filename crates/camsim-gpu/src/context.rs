@@ -80,6 +80,10 @@ impl fmt::Display for AdapterSummary {
     }
 }
 
+/// Pixels that a thread takes on a software adapter: on llvmpipe reading a line's poses costs as much as the rest of a pixel, and there are few processors
+/// to be kept busy (docs/PERFORMANCE.md).
+const SOFTWARE_PIXELS: u32 = 16;
+
 /// Device, queue, and what they run on.
 #[derive(Debug)]
 pub struct GpuContext {
@@ -91,6 +95,8 @@ pub struct GpuContext {
     pub adapter: AdapterSummary,
     /// Largest side of a picture that is held whole.
     pub(crate) max_picture_px: u32,
+    /// Pixels of a line that a thread of the reverse kernel takes.
+    pub(crate) pixels_a_thread: u32,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -142,7 +148,8 @@ impl GpuContext {
             return Err(GpuError::NoAdapter(named));
         }
         let adapter = candidates.remove(0);
-        let summary = AdapterSummary::of(&adapter.get_info());
+        let info = adapter.get_info();
+        let summary = AdapterSummary::of(&info);
         let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("camsim"),
             // Only for measuring; nothing else depends on it.
@@ -155,7 +162,11 @@ impl GpuContext {
         let (device, queue) =
             pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
-        Ok(Self { device, queue, adapter: summary, max_picture_px })
+        let pixels_a_thread = match info.device_type {
+            wgpu::DeviceType::Cpu => SOFTWARE_PIXELS,
+            _ => 1,
+        };
+        Ok(Self { device, queue, adapter: summary, max_picture_px, pixels_a_thread })
     }
 
     /// Largest side of a texture.

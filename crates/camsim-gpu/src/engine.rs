@@ -12,7 +12,7 @@ use crate::{
     layout::Truth,
     recorder::{PassClock, Recorder},
     reverse::{
-        EMPTY_LIST, PipelineKey, ReverseBindings, ReversePass, frame_uniforms,
+        EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms,
         lens_inverse::{LensInversePass, LensMap},
     },
     shaders::ComposeError,
@@ -21,7 +21,7 @@ use crate::{
 };
 use camsim_core::{
     frame::RenderedFrame,
-    noise::tail_table,
+    noise::tail_segments,
     plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
     pose::CameraPose,
     scenario::Channel,
@@ -96,6 +96,12 @@ impl Engine {
         self.gpu.max_picture_px = max_side_px.min(self.gpu.max_side_px());
     }
 
+    /// How many pixels of a line each thread takes, for frames of sessions to come: many for a software adapter (the default there), one for a GPU,
+    /// which wants threads. Pictures are the same, byte for byte.
+    pub fn set_pixels_a_thread(&mut self, pixels: u32) {
+        self.gpu.pixels_a_thread = pixels.max(1);
+    }
+
     /// Most pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
@@ -120,7 +126,7 @@ impl Engine {
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
         let session = Session {
             vignette: vignette_buffer(gpu, &sequence),
-            noise_table: storage_buffer(gpu, "camsim.noise_table", &tail_table()),
+            noise_table: storage_buffer(gpu, "camsim.noise_table", tail_segments().as_flattened()),
             ideal_pass,
             reverse_pass: ReversePass::new(gpu),
             lens_pass: None,
@@ -433,7 +439,7 @@ impl Session<'_> {
             out_truth: buffers.truth.as_ref().map(|truth| &truth.on_device),
         };
         let groups = &mut target.groups[slot];
-        self.reverse_pass.encode(gpu, recorder, PipelineKey::of(plan), plan.camera.size_px, &bindings, groups)
+        self.reverse_pass.encode(gpu, recorder, plan, &bindings, groups)
     }
 
     /// Waits for a frame and takes its pictures.

@@ -120,20 +120,23 @@ enum Lists {
 #[derive(Debug)]
 pub struct ReversePass {
     variants: HashMap<PipelineKey, Kernels>,
-    sampler: wgpu::Sampler,
+    /// Between texels, and of none of them.
+    samplers: [wgpu::Sampler; 2],
 }
 
 impl ReversePass {
     /// Compiles nothing yet.
     #[must_use]
     pub fn new(gpu: &GpuContext) -> Self {
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("camsim.reverse.sampler"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
+        let samplers = [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(|filter| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("camsim.reverse.sampler"),
+                mag_filter: filter,
+                min_filter: filter,
+                ..Default::default()
+            })
         });
-        Self { variants: HashMap::new(), sampler }
+        Self { variants: HashMap::new(), samplers }
     }
 
     /// Records the kernel of a plan; `groups` are those of these `bindings`.
@@ -144,11 +147,11 @@ impl ReversePass {
         &mut self,
         gpu: &GpuContext,
         recorder: &mut Recorder<'_>,
-        key: PipelineKey,
-        size_px: [u32; 2],
+        plan: &FramePlan,
         bindings: &ReverseBindings<'_>,
         groups: &mut ReverseGroups,
     ) -> Result<(), ComposeError> {
+        let key = PipelineKey::of(plan);
         let kernels = match self.variants.entry(key) {
             Entry::Occupied(compiled) => compiled.into_mut(),
             Entry::Vacant(first_use) => first_use.insert(Kernels {
@@ -163,13 +166,14 @@ impl ReversePass {
             }),
         };
         let [of_picture, of_silhouettes @ ..] = groups.0.entry(key).or_insert_with(|| {
-            let bind = |variant: &Variant| variant.bind(gpu, &self.sampler, bindings);
+            let bind = |variant: &Variant| variant.bind(gpu, &self.samplers, bindings);
             let [candidates, rays] = kernels.silhouettes.as_ref().map(|of| of.each_ref().map(bind)).unwrap_or_default();
             [bind(&kernels.picture), candidates, rays]
         });
         let mut pass = recorder.compute_pass("reverse");
         kernels.picture.set(&mut pass, of_picture);
-        pass.dispatch_workgroups(size_px[0].div_ceil(WORKGROUP_PX), size_px[1].div_ceil(WORKGROUP_PX), 1);
+        let [across, down] = workgroups(plan, pixels_a_thread(gpu, key));
+        pass.dispatch_workgroups(across, down, 1);
         drop(pass);
         if let (Some(variants), Some(lists)) = (&kernels.silhouettes, bindings.lists) {
             for (((variant, groups), list), name) in variants.iter().zip(of_silhouettes).zip(lists).zip(["candidates", "rays"]) {
@@ -180,6 +184,21 @@ impl ReversePass {
         }
         Ok(())
     }
+}
+
+/// Where poses are not held the pixels of a thread would share nothing.
+fn pixels_a_thread(gpu: &GpuContext, key: PipelineKey) -> u32 {
+    if key.holds_line() { gpu.pixels_a_thread } else { 1 }
+}
+
+/// Along x and y, each as long as a thread's pixels along the lines and as wide as a workgroup across them.
+fn workgroups(plan: &FramePlan, pixels_a_thread: u32) -> [u32; 2] {
+    let long = WORKGROUP_PX * pixels_a_thread;
+    let sides_px = match plan.shutter.lines_axis() {
+        LinesAxis::Rows => [long, WORKGROUP_PX],
+        LinesAxis::Columns => [WORKGROUP_PX, long],
+    };
+    std::array::from_fn(|axis| plan.camera.size_px[axis].div_ceil(sides_px[axis]))
 }
 
 impl Variant {
@@ -195,12 +214,14 @@ impl Variant {
             bind_group_layouts: &groups.each_ref().map(Option::as_ref),
             immediate_size: 0,
         });
+        let pixels = [("PIXELS", f64::from(pixels_a_thread(gpu, key)))];
+        let constants = if lists == Lists::Fills && key.holds_line() { &pixels[..] } else { &[] };
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("camsim.reverse"),
             layout: Some(&layout),
             module: &module,
             entry_point: Some(entry_point),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
             cache: None,
         });
         Ok(Self { pipeline, groups, lists })
@@ -215,7 +236,7 @@ impl Variant {
         }
     }
 
-    fn bind(&self, gpu: &GpuContext, sampler: &wgpu::Sampler, b: &ReverseBindings<'_>) -> Groups {
+    fn bind(&self, gpu: &GpuContext, [sampler, nearest]: &[wgpu::Sampler; 2], b: &ReverseBindings<'_>) -> Groups {
         let view = |view| wgpu::BindingResource::TextureView(view);
         let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
             vec![(0, b.frame.as_entire_binding()), (1, b.noise_table.as_entire_binding())],
@@ -225,6 +246,7 @@ impl Variant {
                 (2, view(b.depth)),
                 (3, b.poses.as_entire_binding()),
                 (4, b.vignette.as_entire_binding()),
+                (9, wgpu::BindingResource::Sampler(nearest)),
             ],
             Vec::new(),
             vec![(0, b.out_color.as_entire_binding())],
@@ -267,6 +289,7 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
         entry(2, texture(wgpu::TextureSampleType::Float { filterable: false })),
         entry(3, storage(true)),
         entry(4, storage(true)),
+        entry(9, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)),
     ];
     if key.edges != EdgeKind::None {
         let samples =

@@ -19,6 +19,6 @@ fn smooth_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
 }
 
 fn smooth_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
-    let mid = temporal_inverse_with_depth(ray.uv, pose_mid(pixel));
+    let mid = temporal_inverse_with_depth(ray.uv, pose_of_mid(pixel));
     return seen_from(mid.at_px, mid.inverse_depth, inverse_depth(mid.at_px));
 }

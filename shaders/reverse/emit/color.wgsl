@@ -3,14 +3,12 @@ const EMITS_RAYS: bool = false;
 
 @group(3) @binding(0) var<storage, read_write> out_color: array<vec4<f32>>;
 
-fn emit(pixel: vec2<u32>, color: vec3<f32>) {
-    out_color[pixel.y * frame.size_px.x + pixel.x] = vec4<f32>(color, 1.0);
+fn emit(pixel: vec2<u32>, color: vec4<f32>) {
+    out_color[pixel.y * frame.size_px.x + pixel.x] = color;
 }
 
 fn emit_truth(pixel: vec2<u32>, ray: Ray, source_px: vec2<f32>, mid: Seen) {}
 
 fn emit_unknown(pixel: vec2<u32>, ray: Ray) {}
 
-fn emit_invalid(pixel: vec2<u32>) {
-    out_color[pixel.y * frame.size_px.x + pixel.x] = vec4<f32>(0.0);
-}
+fn emit_no_truth(pixel: vec2<u32>) {}

@@ -16,8 +16,8 @@ struct Truth {
 
 @group(3) @binding(1) var<storage, read_write> out_truth: array<Truth>;
 
-fn emit(pixel: vec2<u32>, color: vec3<f32>) {
-    out_color[pixel.y * frame.size_px.x + pixel.x] = vec4<f32>(color, 1.0);
+fn emit(pixel: vec2<u32>, color: vec4<f32>) {
+    out_color[pixel.y * frame.size_px.x + pixel.x] = color;
 }
 
 // `source_px` at `frame.coords_phase`, `mid` at mid-exposure.
@@ -38,8 +38,6 @@ fn emit_unknown(pixel: vec2<u32>, ray: Ray) {
     out_truth[pixel.y * frame.size_px.x + pixel.x] = Truth(ray.uv, vec2<f32>(0.0), vec3<f32>(0.0), -1.0);
 }
 
-fn emit_invalid(pixel: vec2<u32>) {
-    let i = pixel.y * frame.size_px.x + pixel.x;
-    out_color[i] = vec4<f32>(0.0);
-    out_truth[i] = Truth(vec2<f32>(0.0), vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
+fn emit_no_truth(pixel: vec2<u32>) {
+    out_truth[pixel.y * frame.size_px.x + pixel.x] = Truth(vec2<f32>(0.0), vec2<f32>(0.0), vec3<f32>(0.0), 0.0);
 }

@@ -6,6 +6,12 @@
 #import <slot:nodes>
 #import <slot:path>
 #import <slot:stretches>
+#import <slot:line>
+
+// The node k steps of the path after another one.
+fn node_after(pixel: vec2<u32>, ray: Ray, node: u32, k: u32) -> Source {
+    return next_node(ray, node + k * frame.node_stride, pose_of_step(pixel, node, k));
+}
 
 fn samples_for(length_px: f32, at_least: u32) -> u32 {
     let wanted = u32(ceil(min(frame.samples_per_px * length_px, length_px + 16.0)));

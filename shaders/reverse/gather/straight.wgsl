@@ -1,5 +1,6 @@
 // The paper's exposure: samples on the straight segment between its two ends, both included. Twin: camsim_core::temporal::paper.
 #import reverse/gather/interface.wgsl
+#import <slot:line>
 
 struct Ends {
     first_px: vec2<f32>,

@@ -229,9 +229,15 @@ impl PipelineKey {
         keys
     }
 
+    /// Whether the poses of a line are few enough to be held while a thread goes along it.
+    #[must_use]
+    pub fn holds_line(&self) -> bool {
+        self.keys != KeyKind::Several && !self.paper && (self.one_stretch || !self.blur)
+    }
+
     /// Fillings of the kernel's slots.
     #[must_use]
-    pub fn slots(&self) -> [Slot; 14] {
+    pub fn slots(&self) -> [Slot; 16] {
         let ray = match self.ray {
             RayStage::Pinhole => "reverse/ray/pinhole.wgsl",
             RayStage::LensMap => "reverse/ray/map.wgsl",
@@ -285,6 +291,10 @@ impl PipelineKey {
             PathStage::Quartic => "reverse/gather/path/quartic.wgsl",
         };
         let stretches = if self.one_stretch { "reverse/gather/stretches/one.wgsl" } else { "reverse/gather/stretches/several.wgsl" };
+        let (line, pixels) = match self.holds_line() {
+            true => ("reverse/line/held.wgsl", "reverse/pixels/several.wgsl"),
+            false => ("reverse/line/read.wgsl", "reverse/pixels/one.wgsl"),
+        };
         let emit = if self.truth { "reverse/emit/truth.wgsl" } else { "reverse/emit/color.wgsl" };
         [
             ("keys", keys),
@@ -296,6 +306,8 @@ impl PipelineKey {
             ("nodes", nodes),
             ("path", path),
             ("stretches", stretches),
+            ("line", line),
+            ("pixels", pixels),
             ("tap", tap),
             ("edges", edges),
             ("surface_color", surface_color),

@@ -3,13 +3,12 @@
 var<private> found_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
-    let pose = pose_at_node(pixel, 0u);
+    let pose = pose_of_step(pixel, 0u, 0u);
     found_depth = settled_inverse_depth(ray.uv, pose);
     return source_of_depth(ray.uv, pose, found_depth);
 }
 
-fn next_node(pixel: vec2<u32>, ray: Ray, node: u32) -> Source {
-    let pose = pose_at_node(pixel, node);
+fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {
     found_depth = settled_inverse_depth_from(found_depth, ray.uv, pose);
     return source_of_depth(ray.uv, pose, found_depth);
 }

@@ -5,12 +5,12 @@ var<private> depth_step: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
     let last = frame.nodes - 1u;
-    first_depth = settled_inverse_depth(ray.uv, pose_at_node(pixel, 0u));
-    let last_depth = settled_inverse_depth_from(first_depth, ray.uv, pose_at_node(pixel, last));
+    first_depth = settled_inverse_depth(ray.uv, pose_of_step(pixel, 0u, 0u));
+    let last_depth = settled_inverse_depth_from(first_depth, ray.uv, pose_of_end(pixel));
     depth_step = (last_depth - first_depth) / f32(last);
-    return next_node(pixel, ray, 0u);
+    return next_node(ray, 0u, pose_of_step(pixel, 0u, 0u));
 }
 
-fn next_node(pixel: vec2<u32>, ray: Ray, node: u32) -> Source {
-    return source_of_depth(ray.uv, pose_at_node(pixel, node), first_depth + f32(node) * depth_step);
+fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {
+    return source_of_depth(ray.uv, pose, first_depth + f32(node) * depth_step);
 }

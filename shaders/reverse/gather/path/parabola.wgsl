@@ -12,8 +12,8 @@ struct Curve {
 
 // From a node on, that of number `node`.
 fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let middle = next_node(pixel, ray, node + frame.node_stride);
-    let end = next_node(pixel, ray, node + 2u * frame.node_stride);
+    let middle = node_after(pixel, ray, node, 1u);
+    let end = node_after(pixel, ray, node, 2u);
     let d1 = middle.at_px - begin.at_px;
     let last = end.at_px - middle.at_px;
     return Curve(begin.at_px, d1, last - d1, length(d1) + length(last), begin.inside && middle.inside && end.inside, end);

@@ -14,10 +14,10 @@ struct Curve {
 
 // From a node on, that of number `node`.
 fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let a = next_node(pixel, ray, node + frame.node_stride);
-    let b = next_node(pixel, ray, node + 2u * frame.node_stride);
-    let c = next_node(pixel, ray, node + 3u * frame.node_stride);
-    let end = next_node(pixel, ray, node + 4u * frame.node_stride);
+    let a = node_after(pixel, ray, node, 1u);
+    let b = node_after(pixel, ray, node, 2u);
+    let c = node_after(pixel, ray, node, 3u);
+    let end = node_after(pixel, ray, node, 4u);
     // First differences of neighbours, then those of them, and so on.
     let p = a.at_px - begin.at_px;
     let q = b.at_px - a.at_px;

@@ -11,7 +11,7 @@ struct Curve {
 
 // From a node on, that of number `node`.
 fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let end = next_node(pixel, ray, node + frame.node_stride);
+    let end = node_after(pixel, ray, node, 1u);
     let d1 = end.at_px - begin.at_px;
     return Curve(begin.at_px, d1, length(d1), begin.inside && end.inside, end);
 }

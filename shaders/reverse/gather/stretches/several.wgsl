@@ -32,7 +32,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
 // Source at exposure phase in [-0.5, 0.5], on the very path that `gather` samples.
 fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
     if (phase == 0.0) {
-        return temporal_inverse(ray.uv, pose_mid(pixel));
+        return temporal_inverse(ray.uv, pose_of_mid(pixel));
     }
     let gone = clamp(phase + 0.5, 0.0, 1.0) * f32(stretch_count());
     let k = min(u32(gone), stretch_count() - 1u);
