@@ -123,6 +123,16 @@ mod tests {
     }
 
     #[test]
+    fn segments_are_those_of_the_table() {
+        let (table, segments) = (tail_table(), tail_segments());
+        assert_eq!(segments.len(), OCTAVES * SEGMENTS);
+        for (i, [begin, adds]) in segments.into_iter().enumerate() {
+            let at = i / SEGMENTS * (SEGMENTS + 1) + i % SEGMENTS;
+            assert_eq!((begin, adds), (table[at], table[at + 1] - table[at]), "{i}");
+        }
+    }
+
+    #[test]
     fn moments_and_tails_are_normal() {
         let table = tail_table();
         let (mut sums, mut beyond_3, n) = ([0.0_f64; 4], 0_u32, 1_000_000_u32);
