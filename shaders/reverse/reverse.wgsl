@@ -28,12 +28,24 @@ fn is_in_picture(pixel: vec2<u32>) -> bool {
     return pixel.x < frame.size_px.x && pixel.y < frame.size_px.y;
 }
 
-// R G B A of a pixel; all 0 where nothing is seen.
-fn color_of(pixel: vec2<u32>) -> vec4<f32> {
+// What a pixel shows: R G B A, all 0 where nothing is seen, and the truth about it where it is wanted.
+struct Shown {
+    color: vec4<f32>,
+    truth: Truth,
+}
+
+// Stored in one place, whatever it is: on llvmpipe stores cost as much where no lane takes part.
+fn show(pixel: vec2<u32>) {
+    let shown = shown_by(pixel);
+    emit(pixel, shown.color);
+    emit_truth(pixel, shown.truth);
+}
+
+fn shown_by(pixel: vec2<u32>) -> Shown {
+    var shown = Shown(vec4<f32>(0.0), no_truth());
     let ray = lens_ray(pixel);
     if (!ray.valid) {
-        emit_no_truth(pixel);
-        return vec4<f32>(0.0);
+        return shown;
     }
     let weight = vignette_weight(pixel);
     var gathered = Gathered(vec4<f32>(0.0), true, array<vec2<f32>, 2>());
@@ -42,14 +54,14 @@ fn color_of(pixel: vec2<u32>) -> vec4<f32> {
         gathered = gather(pixel, ray);
     }
     if (!gathered.inside) {
-        emit_no_truth(pixel);
-        return vec4<f32>(0.0);
+        return shown;
     }
     if (weight > 0.0) {
         list_for_rays(pixel, ray, gathered);
     }
     if (EMITS_RAYS) {
-        emit_truth(pixel, ray, smooth_px_at_phase(pixel, ray, coords_phase()), smooth_mid(pixel, ray));
+        shown.truth = truth_of(ray, smooth_px_at_phase(pixel, ray, coords_phase()), smooth_mid(pixel, ray));
     }
-    return vec4<f32>(output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)), 1.0);
+    shown.color = vec4<f32>(output_color(photometric(pixel, after_gather(ray, gathered.color.rgb), weight)), 1.0);
+    return shown;
 }

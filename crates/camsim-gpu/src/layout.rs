@@ -82,7 +82,7 @@ pub struct KeyLayout {
     pub pad2: u32,
 }
 
-/// Mirror of `Truth` in shaders/reverse/emit/truth.wgsl.
+/// Mirror of `Truth` in shaders/reverse/edges/seen.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "documented in the shader, field by field")]

@@ -174,9 +174,9 @@ fn seen_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
 fn emit_centre(pixel: vec2<u32>, ray: Ray) {
     use_key_of_line(pixel);
     if (!IS_EXACT) {
-        emit_truth(pixel, ray, seen_px_at_phase(pixel, ray, coords_phase()), seen_mid(pixel, ray));
+        emit_truth(pixel, truth_of(ray, seen_px_at_phase(pixel, ray, coords_phase()), seen_mid(pixel, ray)));
     } else if (near_edge(ray.uv, pose_mid(pixel)) || near_edge(ray.uv, pose_along(pixel, coords_phase() + 0.5))) {
-        emit_unknown(pixel, ray);
+        emit_truth(pixel, unknown_truth(ray));
     }
 }
 

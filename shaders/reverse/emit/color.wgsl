@@ -7,8 +7,4 @@ fn emit(pixel: vec2<u32>, color: vec4<f32>) {
     out_color[pixel.y * frame.size_px.x + pixel.x] = color;
 }
 
-fn emit_truth(pixel: vec2<u32>, ray: Ray, source_px: vec2<f32>, mid: Seen) {}
-
-fn emit_unknown(pixel: vec2<u32>, ray: Ray) {}
-
-fn emit_no_truth(pixel: vec2<u32>) {}
+fn emit_truth(pixel: vec2<u32>, truth: Truth) {}

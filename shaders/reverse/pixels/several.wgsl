@@ -10,6 +10,6 @@ fn take_pixels(group: vec2<u32>, place: vec2<u32>) {
         if (!is_in_picture(pixel)) {
             break;
         }
-        emit(pixel, color_of(pixel));
+        show(pixel);
     }
 }
