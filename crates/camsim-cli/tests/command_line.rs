@@ -474,6 +474,9 @@ fn a_folder_of_pictures_goes_through_the_camera() {
     let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new)]);
     assert!(code == 2 && err.contains("2 of 4 frames, first frame 0") && err.contains("it covers --frames 1..=2"), "{err}");
     assert!(!new.exists());
+    // One that has too few rows there is told of.
+    let (_, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&new), "--frames", "1..3"]);
+    assert!(err.contains("FRAMES.toml: 2 of 2 frames, first frame 1, are taken in gaps of the trajectory of up to 2.0 s"), "{err}");
 
     // One frame has no folder.
     fs::write(&frames, "color = \"rgb/0.5.png\"\nfocal_px = [300.0, 300.0]\n").unwrap();

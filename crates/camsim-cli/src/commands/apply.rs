@@ -140,6 +140,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
     let (picture, unseen) = pipeline.render_and_count(vignette.as_ref());
     let elapsed_s = begin.elapsed().as_secs_f64();
+    folder::tell_gaps(args, &spec, &set, &[0], console)?;
     write_picture(&args.output, &picture, spec.photometric.output).or_failed()?;
 
     let [width, height] = spec.size_px;

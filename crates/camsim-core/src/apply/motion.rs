@@ -69,6 +69,15 @@ impl Motion {
         }
     }
 
+    /// The longest time between two rows of a table that a window, or its edge, lies between; 0 without a table.
+    #[must_use]
+    pub fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
+        match self {
+            Self::Twist(_) => 0.0,
+            Self::Poses(track) => track.longest_step_s(first_s, last_s),
+        }
+    }
+
     /// Instants over an exposure at which to look at the path: four to a row of the table, at least 32.
     #[must_use]
     pub fn instants(&self, exposure_s: f64) -> u32 {
@@ -169,6 +178,11 @@ impl PoseTrack {
         Ok(())
     }
 
+    fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
+        let steps = self.rows.windows(2).map(|rows| [rows[0].t_s, rows[1].t_s]);
+        steps.filter(|[from_s, to_s]| *to_s > first_s && *from_s < last_s).map(|[from_s, to_s]| to_s - from_s).fold(0.0, f64::max)
+    }
+
     fn mean_step_s(&self) -> f64 {
         (self.rows[self.rows.len() - 1].t_s - self.rows[0].t_s) / (self.rows.len() - 1) as f64
     }
@@ -228,6 +242,17 @@ mod tests {
             });
             assert!((rotation * in_line + shift - in_key).length() < 1e-11, "{dt_s}");
         }
+    }
+
+    #[test]
+    fn the_longest_step_is_that_around_a_window() {
+        let row = |t_s: f64| PoseRow { t_s, position_m: DVec3::ZERO, world_from_camera: DQuat::IDENTITY };
+        let track = Motion::Poses(PoseTrack::new([0.0, 0.1, 0.2, 3.2, 3.3].map(|t_s| row(100.0 + t_s)).to_vec(), 100.0).unwrap());
+        for (window, expected) in [([0.02, 0.08], 0.1), ([0.05, 0.15], 0.1), ([0.15, 0.25], 3.0), ([1.0, 1.1], 3.0), ([3.21, 3.25], 0.1)] {
+            let found = track.longest_step_s(window[0], window[1]);
+            assert!((found - expected).abs() < 1e-9, "{window:?}: {found}");
+        }
+        assert_eq!(Motion::Twist(twist()).longest_step_s(0.0, 1.0), 0.0);
     }
 
     #[test]

@@ -25,6 +25,9 @@ use crate::{
     progress::frames_bar,
 };
 
+/// Rows of a trajectory that are farther apart have a gap between them: as in flight logs.
+const GAP_S: f64 = 1.0;
+
 /// `--format`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
@@ -76,6 +79,7 @@ pub(super) fn run(
     }
     let frames = chosen(args, set)?;
     check_motion(args, spec, set, &frames)?;
+    tell_gaps(args, spec, set, &frames, console)?;
     let inputs = inputs(args, spec, set)?;
     match check_resume_of(folder, "apply", &inputs) {
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
@@ -130,11 +134,36 @@ fn chosen(args: &Args, set: &FrameSet) -> Result<Vec<u64>, Failure> {
     })
 }
 
-/// Every frame's window must be within the trajectory.
-fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
+/// A frame's first and last instant, after its stamp.
+fn window_s(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<[f64; 2], Failure> {
     let shutter = Shutter::from_spec(&spec.shutter, spec.fps, spec.size_px).map_err(|error| in_file(args, &error.into())).or_bad_input()?;
     let (first_s, last_s) = shutter.window_s();
-    let [first_s, last_s] = [first_s.min(set.instant_s()), last_s.max(set.instant_s())];
+    Ok([first_s.min(set.instant_s()), last_s.max(set.instant_s())])
+}
+
+/// Warns of frames that are taken where the trajectory has no rows.
+pub(super) fn tell_gaps(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64], console: &mut Console<'_>) -> Result<(), Failure> {
+    let [first_s, last_s] = window_s(args, spec, set)?;
+    let mut steps = Vec::new();
+    for &frame in frames {
+        let step_s = set.motion(frame as usize).or_bad_input()?.longest_step_s(first_s, last_s);
+        steps.extend((step_s > GAP_S).then_some((frame, step_s)));
+    }
+    if let Some((frame, _)) = steps.first() {
+        let longest_s = steps.iter().fold(0.0_f64, |longest, (_, step_s)| longest.max(*step_s));
+        console.warn(format_args!(
+            "{}: {} of {} frames, first frame {frame}, are taken in gaps of the trajectory of up to {longest_s:.1} s, which are joined by a straight line and a constant turn",
+            args.frame.display(),
+            steps.len(),
+            frames.len()
+        ));
+    }
+    Ok(())
+}
+
+/// Every frame's window must be within the trajectory.
+fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) -> Result<(), Failure> {
+    let [first_s, last_s] = window_s(args, spec, set)?;
     let mut covered = Vec::new();
     let mut missing = None;
     for &frame in frames {
