@@ -46,39 +46,47 @@ impl<'a, const AXES: usize> Search<'a, AXES> {
         triangle.map(|corner| &self.points[corner as usize])
     }
 
-    /// Distance of the farthest point of `of`, if that is more than `known_m`.
+    /// Bound of the distance of the farthest point of `of`, and not less than `known_m`.
     fn farthest_m(&self, of: &[[u32; 3]], known_m: f64) -> f64 {
-        let mut farthest_m = known_m;
+        // What is known to be there, and what nothing exceeds: were the two one number, each part would raise what the next one is allowed.
+        let (mut least_m, mut most_m) = (known_m, known_m);
         let mut waiting: Vec<([Point<AXES>; 3], u32)> = Vec::new();
         for &triangle in of {
             waiting.push((self.corners(triangle).map(|corner| *corner), 0));
             while let Some((corners, cuts)) = waiting.pop() {
-                let [at_least_m, at_most_m] = self.bounds_m(&corners);
-                farthest_m = farthest_m.max(at_least_m);
-                if at_most_m <= WORTH * farthest_m || cuts == MOST_CUTS {
-                    farthest_m = farthest_m.max(at_most_m);
+                let at_most_m = self.at_most_m(&corners);
+                let is_settled = |least_m: f64| at_most_m <= most_m.max(WORTH * least_m) || cuts == MOST_CUTS;
+                if !is_settled(least_m) {
+                    least_m = least_m.max(self.at_least_m(&corners));
+                }
+                if is_settled(least_m) {
+                    most_m = most_m.max(at_most_m);
                 } else {
                     waiting.extend(quarters(&corners).map(|part| (part, cuts + 1)));
                 }
             }
         }
-        farthest_m
+        most_m
     }
 
-    /// What the farthest point of a triangle is away, at least and at most.
-    fn bounds_m(&self, corners: &[Point<AXES>; 3]) -> [f64; 2] {
-        let each2 = corners.each_ref().map(|corner| {
+    /// What the farthest point of a triangle is away, at least: its farthest corner.
+    fn at_least_m(&self, corners: &[Point<AXES>; 3]) -> f64 {
+        let each = corners.each_ref().map(|corner| {
             let of_triangle = |k: u32| distance2(corner, self.corners(self.triangles[k as usize])).sqrt();
             self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(corner))), of_triangle)
         });
+        each.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The same at most: by the one triangle that suits all its corners best.
+    fn at_most_m(&self, corners: &[Point<AXES>; 3]) -> f64 {
         let middle: Point<AXES> = std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
         let all = |k: u32| {
             let other = self.corners(self.triangles[k as usize]);
             corners.iter().map(|corner| distance2(corner, other)).fold(0.0, f64::max).sqrt()
         };
         // No triangle is nearer to the farthest corner than to the middle.
-        let at_most = self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(&middle))), all);
-        [each2.into_iter().fold(0.0, f64::max), at_most]
+        self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(&middle))), all)
     }
 }
 
