@@ -2,7 +2,9 @@
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
-use camsim_core::scene::{Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::level_stretch};
+use camsim_core::scene::{
+    Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::level_stretch,
+};
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
 

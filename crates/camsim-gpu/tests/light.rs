@@ -123,7 +123,8 @@ fn tints_holes_and_light_of_its_own_go_with_light() {
     // south and east of it.
     shape.normals = [[0.6, 0.0, -0.8], [0.0, 0.0, -1.0], [0.0, 0.6, -0.8], [0.0, 0.0, -1.0]].to_vec();
     let tint = DVec3::new(0.5, 1.0, 0.25);
-    let expected = albedo * tint * of_face(DVec3::new(0.6, 0.0, -0.8).lerp(DVec3::new(0.0, 0.6, -0.8), 30.25 / 60.0)) + DVec3::new(0.1, 0.05, 0.0);
+    let expected =
+        albedo * tint * of_face(DVec3::new(0.6, 0.0, -0.8).lerp(DVec3::new(0.0, 0.6, -0.8), 30.25 / 60.0)) + DVec3::new(0.1, 0.05, 0.0);
     expect_in_the_middle("all", mesh.clone(), Some(sun()), expected);
     let both = pictures(&in_light(vec![mesh.clone()], Some(sun())));
     assert!(psnr_db(&both) > 55.0, "{}", psnr_db(&both));
@@ -158,7 +159,7 @@ fn many_turned_copies_are_as_near_to_the_oracle_as_without_light() {
     let place = |k: u32| {
         let part = |step: f64| (f64::from(k) * step).fract() - 0.5;
         let turn = DMat3::from_rotation_z(7.0 * part(0.31)) * DMat3::from_rotation_x(2.0 * part(0.47));
-        let stretch = if k % 3 == 0 { DVec3::new(1.0, 0.5, 1.5) } else { DVec3::ONE };
+        let stretch = if k.is_multiple_of(3) { DVec3::new(1.0, 0.5, 1.5) } else { DVec3::ONE };
         Mesh {
             shape: shape.clone(),
             origin_ned_m: DVec3::new(60.0 * part(0.618_034), 80.0 * part(0.754_878), 20.0 * part(0.569_84)),

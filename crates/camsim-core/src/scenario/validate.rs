@@ -263,7 +263,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{BoardSpec, FlightSpec, GltfSpec, LightSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
 
     fn good() -> Scenario {
         Scenario {

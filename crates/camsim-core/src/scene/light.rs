@@ -96,11 +96,15 @@ mod tests {
         let (along, across) = (DVec3::new(1.0, 2.0, -0.5), DVec3::new(-0.3, 0.7, 1.1));
         let normal = along.cross(across).normalize();
         let turn = DMat3::from_quat(DQuat::from_rotation_z(0.4) * DQuat::from_rotation_x(1.9));
-        for (scale, mirrored) in [([2.0, 2.0, 2.0], false), ([1.0, 5.0, 0.2], false), ([-1.0, 3.0, 1.0], true), ([1e-6, -1e-6, -1e-6], false)] {
+        for (scale, mirrored) in
+            [([2.0, 2.0, 2.0], false), ([1.0, 5.0, 0.2], false), ([-1.0, 3.0, 1.0], true), ([1e-6, -1e-6, -1e-6], false)]
+        {
             let matrix = turn * DMat3::from_diagonal(DVec3::from_array(scale));
             let (a, b) = (matrix * along, matrix * across);
             let found = turned_normal(&matrix, normal);
-            assert!((found.length() - 1.0).abs() < 1e-12 && found.dot(a.normalize()).abs() < 1e-12 && found.dot(b.normalize()).abs() < 1e-12);
+            assert!(
+                (found.length() - 1.0).abs() < 1e-12 && found.dot(a.normalize()).abs() < 1e-12 && found.dot(b.normalize()).abs() < 1e-12
+            );
             // The side that it is on moves along with it.
             assert!(found.dot(matrix * normal) > 0.0, "{scale:?}");
             assert_eq!(found.dot(a.cross(b)) < 0.0, mirrored);

@@ -291,11 +291,9 @@ fn planes_do_not_share_corners_and_given_normals_are_mended() {
 
 #[test]
 fn light_falls_on_nothing_that_is_unlit_or_shines() {
-    for (material, lit) in [
-        (r#"{}"#, true),
-        (r#"{ "emissiveFactor": [0.5, 0, 0] }"#, true),
-        (r#"{ "extensions": { "KHR_materials_unlit": {} } }"#, false),
-    ] {
+    for (material, lit) in
+        [(r#"{}"#, true), (r#"{ "emissiveFactor": [0.5, 0, 0] }"#, true), (r#"{ "extensions": { "KHR_materials_unlit": {} } }"#, false)]
+    {
         let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
         let model = square_with(5, &rest, r#"{ "mesh": 0 }"#, WITH_NORMALS).unwrap();
         assert_eq!(!standing(&model, 0.0).is_empty(), lit, "{material}");

@@ -47,14 +47,20 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
 fn check_light(check: &mut Check, light: &LightSpec) {
     check.finite("scene.light.sun_azimuth_deg", &[light.sun_azimuth_deg]);
     check.require((0.0..=90.0).contains(&light.sun_elevation_deg), "scene.light.sun_elevation_deg", || {
-        format!("must be 0 (on the horizon) to 90 (overhead), not {}; for a night leave the sun out: scene.light.sun = 0", light.sun_elevation_deg)
+        format!(
+            "must be 0 (on the horizon) to 90 (overhead), not {}; for a night leave the sun out: scene.light.sun = 0",
+            light.sun_elevation_deg
+        )
     });
     for (key, share) in [("scene.light.sun", light.sun), ("scene.light.sky", light.sky)] {
         check.require((0.0..=1.0).contains(&share), key, || format!("must be 0 to 1 of a colour, not {share}"));
     }
     // Not more than white; a brighter day is the camera's matter. A hair for sums like 0.7 + 0.3.
     check.require(light.sun.is_nan() || light.sky.is_nan() || light.sun + light.sky <= 1.0 + 1e-9, "scene.light.sky", || {
-        format!("and scene.light.sun are {} together, and must be at most 1; camera.photometric.light makes pictures brighter", light.sun + light.sky)
+        format!(
+            "and scene.light.sun are {} together, and must be at most 1; camera.photometric.light makes pictures brighter",
+            light.sun + light.sky
+        )
     });
 }
 

@@ -78,7 +78,8 @@ fn every_normal_of_a_level_is_within_its_error() {
 
 #[test]
 fn light_on_what_is_stretched_unevenly_leaves_no_level() {
-    let mut mesh = Mesh::new(vec![], vec![], Arc::new(Texture::uniform([255; 4], Encoding::Linear)), DVec3::ZERO, crate::scene::Wrap::Clamp);
+    let mut mesh =
+        Mesh::new(vec![], vec![], Arc::new(Texture::uniform([255; 4], Encoding::Linear)), DVec3::ZERO, crate::scene::Wrap::Clamp);
     for (normals, uneven, expected) in [(false, true, 4.0), (true, false, 2.0), (true, true, f64::INFINITY)] {
         mesh.shape = Arc::new(if normals { lit_globe(8) } else { globe(8) });
         let scale = DVec3::new(2.0, if uneven { 4.0 } else { 2.0 }, 2.0);

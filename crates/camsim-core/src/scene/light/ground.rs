@@ -57,7 +57,8 @@ impl Ground {
             if !own.is_nan() {
                 return own;
             }
-            let around = (j.saturating_sub(1)..(j + 2).min(rows)).flat_map(|j| (i.saturating_sub(1)..(i + 2).min(cols)).map(move |i| (i, j)));
+            let around =
+                (j.saturating_sub(1)..(j + 2).min(rows)).flat_map(|j| (i.saturating_sub(1)..(i + 2).min(cols)).map(move |i| (i, j)));
             let (sum, count) =
                 around.map(|(i, j)| here[j * cols + i]).filter(|l| !l.is_nan()).fold((0.0, 0.0), |(sum, n), l| (sum + l, n + 1.0));
             if count > 0.0 { sum / count } else { level }
@@ -69,9 +70,8 @@ impl Ground {
             let (x, y) = (k % size[0], k / size[0]);
             let (i, j) = (inside(x, cols), inside(y, rows));
             // The ring is as far from the border as the border from the row within.
-            let mirrored = [(x, i, cols), (y, j, rows)].map(|(at, near, of)| {
-                if at == near + 1 { near } else { (2 * near + 1).saturating_sub(at).min(of - 1) }
-            });
+            let mirrored = [(x, i, cols), (y, j, rows)]
+                .map(|(at, near, of)| if at == near + 1 { near } else { (2 * near + 1).saturating_sub(at).min(of - 1) });
             let (edge, within) = (vertex(terrain, [i, j]).1, vertex(terrain, mirrored).1);
             if mirrored == [i, j] { edge } else { [0, 1].map(|axis: usize| 2.0 * edge[axis] - within[axis]) }
         };

@@ -50,7 +50,8 @@ fn hills(turn: f64, side_px: u32, void: impl Fn(u32, u32) -> bool) -> (Terrain, 
         if void(i, j) { DVec3::NAN } else { at }
     };
     let points: Vec<DVec3> = (0..40 * 30).map(point).collect();
-    let uv = |k: u32| (0.5 + DVec2::from_angle(turn).rotate(DVec2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 15.0)) / 60.0).as_vec2();
+    let uv =
+        |k: u32| (0.5 + DVec2::from_angle(turn).rotate(DVec2::new(f64::from(k % 40) - 20.0, f64::from(k / 40) - 15.0)) / 60.0).as_vec2();
     let uvs: Vec<[f32; 2]> = (0..40 * 30).map(|k| uv(k).to_array()).collect();
     let texture = Texture { size_px: [side_px; 2], rgba8: vec![255; 4 * (side_px * side_px) as usize], encoding: Encoding::Linear };
     (Terrain::new(40, 30, &points, &uvs, Arc::new(texture)).unwrap(), points)
