@@ -1,6 +1,5 @@
-// Triangle meshes with holes where their picture's alpha is below the cut-off. Each sample of a pixel looks for itself, so that a hole's border is
-// one as a triangle's is. Twin: camsim_core::scene::Mesh::shows.
-#import ideal/mesh_surface.wgsl
+// Triangle meshes with holes.
+#import ideal/holes.wgsl
 
 struct HoledSurface {
     @builtin(position) clip: vec4<f32>,
@@ -18,15 +17,10 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) position_m: vec3<
     return HoledSurface(surface.clip, surface.uv, surface.in_camera_m, tint, uv, tint.a);
 }
 
-// The picture at its full size.
-fn is_hole(in: HoledSurface) -> bool {
-    return textureSampleLevel(surface_texture, surface_sampler, in.sample_uv, 0.0).a * in.sample_alpha < material.emissive_cutoff.w;
-}
-
 @fragment
 fn fragment(in: HoledSurface) -> @location(0) vec4<f32> {
     let color = mesh_color(in.uv, in.tint, in.in_camera_m);
-    if (is_hole(in)) {
+    if (is_hole(in.sample_uv, in.sample_alpha)) {
         discard;
     }
     return color;
@@ -35,7 +29,7 @@ fn fragment(in: HoledSurface) -> @location(0) vec4<f32> {
 // Where nothing but depth is drawn.
 @fragment
 fn fragment_depth(in: HoledSurface) {
-    if (is_hole(in)) {
+    if (is_hole(in.sample_uv, in.sample_alpha)) {
         discard;
     }
 }

@@ -4,6 +4,8 @@
 struct MeshMaterial {
     // Light of its own; alpha below which there is a hole.
     emissive_cutoff: vec4<f32>,
+    // Towards the sun, NED, times its strength; the sky's.
+    sun_sky: vec4<f32>,
 }
 
 @group(1) @binding(2) var<uniform> material: MeshMaterial;

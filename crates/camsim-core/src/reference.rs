@@ -135,7 +135,7 @@ impl Oracle {
             fixed,
             zoomed: Mutex::default(),
             ground: scene.terrain.as_ref().map(Ground::new),
-            meshes: Meshes::new(&scene.meshes),
+            meshes: Meshes::new(&scene.meshes, scene.light),
             paint: Paint::new(scene),
             sequence,
         })

@@ -17,7 +17,9 @@ pub use camera::{
     Axis, CameraSpec, LensModel, LensSpec, MountSpec, OutputEncoding, Parity, PhotometricSpec, Readout, ShutterSpec, VibrationSpec,
     ZoomSpec,
 };
-pub use scene::{BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, PatternCentre, PatternSpec, SceneSpec, TerrainSpec};
+pub use scene::{
+    BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, LightSpec, PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
+};
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera,
 };

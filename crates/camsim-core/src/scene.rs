@@ -8,6 +8,7 @@ use crate::pose::CameraPose;
 pub mod board;
 pub(crate) mod box_tree;
 pub mod levels;
+pub mod light;
 pub mod mesh;
 pub mod picture_tiles;
 pub mod terrain;
@@ -15,6 +16,7 @@ pub mod texture;
 
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
+pub use light::Light;
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
 pub use terrain::{
@@ -34,6 +36,8 @@ pub struct Scene {
     pub sky_linear: [f32; 3],
     /// Visibility V in metres: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
     pub fog_visibility_m: Option<f64>,
+    /// Light on meshes whose shapes have normals; the ground has it in its picture ([`Terrain::light_up`]). Without, colours are as they are.
+    pub light: Option<Light>,
 }
 
 impl Scene {

@@ -232,6 +232,11 @@ impl IdealPass {
             step_mode: wgpu::VertexStepMode::Vertex,
             attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm16x4],
         };
+        let mesh_normals = wgpu::VertexBufferLayout {
+            array_stride: size_of::<[f32; 3]>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &wgpu::vertex_attr_array![3 => Float32x3],
+        };
         let (reads, samples, format) = match key {
             SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
             // Nothing is read for depth, but for holes.
@@ -246,9 +251,10 @@ impl IdealPass {
         let mut meshes = HashMap::new();
         for MeshBatch { kind, .. } in batches {
             if !meshes.contains_key(kind) {
-                let file = if kind.holes { "ideal/mesh_holes.wgsl" } else { "ideal/mesh.wgsl" };
                 let drawing = Drawing { one_sided: kind.one_sided, holes: kind.holes, ..on_ground };
-                meshes.insert(*kind, pipeline(gpu, file, &slots(false), &layouts, &[Some(mesh_vertices.clone())], drawing)?);
+                let vertices = [Some(mesh_vertices.clone()), Some(mesh_normals.clone())];
+                let vertices = if kind.lit { &vertices[..] } else { &vertices[..1] };
+                meshes.insert(*kind, pipeline(gpu, kind.shader(), &slots(false), &layouts, vertices, drawing)?);
             }
         }
         Ok(SurfacePipelines { terrain, meshes })

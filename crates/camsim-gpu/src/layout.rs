@@ -112,6 +112,16 @@ impl From<&MeshVertex> for MeshVertexData {
     }
 }
 
+/// What is on a mesh besides its picture. Mirror of `MeshMaterial` in `shaders/ideal/mesh_surface.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshMaterial {
+    /// Light of its own, and the alpha below which there is a hole.
+    pub emissive_cutoff: [f32; 4],
+    /// Towards the sun (NED) times its strength, and the sky's.
+    pub sun_sky: [f32; 4],
+}
+
 /// Where a mesh stands from a key: rows of a turn, each followed by the origin's place. Mirror of `MeshPlacement` in `shaders/ideal/mesh_surface.wgsl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
@@ -229,6 +239,7 @@ mod tests {
         let slots = [crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(false)];
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
+        assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);
         let module = parse(shaders::compose("ideal/near_marks.wgsl", &[]).unwrap());
         assert_mirror!(&module, "KeyLayout", KeyLayout, [ideal_size_px, first_row, tiles_across, index_count, pad0, pad1, pad2]);
     }

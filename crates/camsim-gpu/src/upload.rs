@@ -2,13 +2,15 @@
 
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
-use camsim_core::scene::{Aabb, Encoding, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::stretch};
+use camsim_core::scene::{
+    Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::level_stretch,
+};
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
 
 use crate::{
     context::{GpuContext, GpuError},
-    layout::MeshVertexData,
+    layout::{MeshMaterial, MeshVertexData},
     tiles::TilePool,
 };
 
@@ -58,7 +60,9 @@ pub struct MeshBatch {
     pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
     pub sampler: wgpu::Sampler,
-    /// Light of its own, and the alpha below which there is a hole.
+    /// Normals, where light falls on them.
+    pub normals: Option<wgpu::Buffer>,
+    /// Light of its own, the alpha below which there is a hole, and the scene's light.
     pub material: wgpu::Buffer,
     /// Which pipeline draws it.
     pub kind: MeshKind,
@@ -73,6 +77,20 @@ pub struct MeshKind {
     pub one_sided: bool,
     /// Samples ask for alpha.
     pub holes: bool,
+    /// Light falls on it.
+    pub lit: bool,
+}
+
+impl MeshKind {
+    /// What draws it, below `shaders/`.
+    pub(crate) fn shader(self) -> &'static str {
+        match (self.holes, self.lit) {
+            (false, false) => "ideal/mesh.wgsl",
+            (false, true) => "ideal/mesh_lit.wgsl",
+            (true, false) => "ideal/mesh_holes.wgsl",
+            (true, true) => "ideal/mesh_holes_lit.wgsl",
+        }
+    }
 }
 
 /// Where a mesh stands.
@@ -82,7 +100,7 @@ pub struct PlacedShape {
     pub origin_ned_m: DVec3,
     /// From the shape's axes to NED.
     pub ned_from_shape: DMat3,
-    /// How many metres one of the shape's becomes at most.
+    /// As [`level_stretch`].
     pub stretch: f64,
 }
 
@@ -98,7 +116,7 @@ impl SceneBuffers {
         let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
         let place = |mesh: &Mesh| {
             let &Mesh { origin_ned_m, ned_from_shape, .. } = mesh;
-            PlacedShape { origin_ned_m, ned_from_shape, stretch: stretch(&ned_from_shape) }
+            PlacedShape { origin_ned_m, ned_from_shape, stretch: level_stretch(mesh) }
         };
         let placed = meshes().map(place).collect();
         let bounds = meshes().map(Mesh::bounds).collect();
@@ -175,13 +193,21 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec
         textures.insert(key, texture.clone());
         let first = order.len() as u32;
         order.extend(members);
-        batches.push(upload_batch(gpu, mesh, levels.of(&mesh.shape), texture, first..order.len() as u32));
+        batches.push(upload_batch(gpu, mesh, scene.light, levels.of(&mesh.shape), texture, first..order.len() as u32));
     }
     Ok((batches, order))
 }
 
-fn upload_batch(gpu: &GpuContext, mesh: &Mesh, levels: Arc<ShapeLevels>, texture: wgpu::TextureView, members: Range<u32>) -> MeshBatch {
+fn upload_batch(
+    gpu: &GpuContext,
+    mesh: &Mesh,
+    light: Option<Light>,
+    levels: Arc<ShapeLevels>,
+    texture: wgpu::TextureView,
+    members: Range<u32>,
+) -> MeshBatch {
     let (shape, material) = (&mesh.shape, &mesh.material);
+    let light = light.filter(|_| shape.has_normals());
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();
     let (mut indices, mut ranges) = (Vec::<u32>::new(), Vec::new());
     for level in levels.levels() {
@@ -190,19 +216,21 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, levels: Arc<ShapeLevels>, texture
         ranges.push(first..indices.len() as u32);
     }
     let [r, g, b] = material.emissive;
-    let uniform = [r, g, b, material.cutoff.unwrap_or(0.0)];
+    let sun_sky = light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
+    let uniform = MeshMaterial { emissive_cutoff: [r, g, b, material.cutoff.unwrap_or(0.0)], sun_sky };
     let buffer = |label, contents: &[u8], usage| {
         gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
     };
     MeshBatch {
         vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
         indices: buffer("camsim.mesh.indices", bytemuck::cast_slice(&indices), wgpu::BufferUsages::INDEX),
+        normals: light.map(|_| buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)),
         ranges,
         levels,
         texture,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
-        material: buffer("camsim.mesh.material", bytemuck::cast_slice(&uniform), wgpu::BufferUsages::UNIFORM),
-        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some() },
+        material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
+        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some(), lit: light.is_some() },
         members,
     }
 }

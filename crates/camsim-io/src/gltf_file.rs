@@ -1,7 +1,7 @@
 //! glTF 2.0 models: the triangles of one of a file's scenes, posed at one of its times.
 //!
 //! A model's own axes are glTF's: x left, y up, z ahead, metres. [`Model::place`] stands it in north-east-down. Colour is albedo: base colour
-//! times vertex colour, plus what is emitted; light and shade are none. What cannot be shown is refused, with its name, or noted.
+//! times vertex colour, plus what is emitted; light and shade are the scene's matter, which normals are read for if it asks. What cannot be shown is refused, with its name, or noted.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -15,6 +15,7 @@ use glam::{DAffine3, DMat3, DVec3};
 mod accessor;
 mod emitted;
 mod material;
+mod normals;
 mod pose;
 mod primitive;
 mod source;
@@ -63,6 +64,8 @@ pub struct GltfOptions {
     pub time_s: Option<f64>,
     /// Number of the animation; all of them together if left out.
     pub animation: Option<usize>,
+    /// Whether corners get normals, for light to fall on them: the file's own, or where it has none those of flat triangles.
+    pub normals: bool,
 }
 
 /// A model's surfaces.
@@ -132,6 +135,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         pose: Pose::new(&source, options)?,
         materials: Materials::new(&source),
         source: &source,
+        options,
         shapes: HashMap::new(),
         parts: Vec::new(),
         met: HashSet::new(),
@@ -152,6 +156,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
 
 struct Reader<'a> {
     source: &'a Source,
+    options: GltfOptions,
     pose: Pose,
     materials: Materials<'a>,
     /// By mesh, primitive and whether it is mirrored: those that no node changes.
@@ -197,6 +202,9 @@ impl Reader<'_> {
             let own = joints.is_some() || primitive.morph_targets().next().is_some();
             let key = (mesh.index(), primitive.index(), mirrored);
             let (material, uv) = self.materials.of(&primitive.material())?;
+            if self.options.normals && uv.loses_colors {
+                self.notes.push("what has a picture of emitted light keeps its colours: light does not fall on it".into());
+            }
             if uv.loses_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
                 self.notes.push("vertex colours under a picture of emitted light are left out".into());
             }
@@ -210,6 +218,7 @@ impl Reader<'_> {
                         uv: &uv,
                         weights: &weights,
                         joints: joints.as_deref(),
+                        normals: self.options.normals && uv.takes_light,
                     };
                     Arc::new(made.shape(&primitive)?)
                 }

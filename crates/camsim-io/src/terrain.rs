@@ -17,7 +17,7 @@ use std::{
 
 use camsim_core::{
     scenario::TerrainSpec,
-    scene::{Terrain, TerrainError, TerrainGrid},
+    scene::{Light, Terrain, TerrainError, TerrainGrid},
 };
 use glam::DVec3;
 use rayon::prelude::*;
@@ -196,6 +196,20 @@ pub fn read_terrain(
     ned_from_geodetic: NedFromGeodetic<'_>,
     height_shift: Option<HeightShift<'_>>,
 ) -> Result<LoadedTerrain, TerrainFileError> {
+    read_terrain_in_light(spec, ned_from_geodetic, height_shift, None)
+}
+
+/// As [`read_terrain`], with light on the ground.
+///
+/// # Errors
+///
+/// As [`read_terrain`].
+pub fn read_terrain_in_light(
+    spec: &TerrainSpec,
+    ned_from_geodetic: NedFromGeodetic<'_>,
+    height_shift: Option<HeightShift<'_>>,
+    light: Option<&Light>,
+) -> Result<LoadedTerrain, TerrainFileError> {
     let dem = Dem::read(&spec.dem, spec.epsg)?;
     let heights = dem.heights();
     let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, &dem)).transpose()?;
@@ -205,17 +219,21 @@ pub fn read_terrain(
             grid.place = ortho.place;
             ortho.texture
         }
-        None => shade::relief(dem.size, heights.range_m, &|at| dem.height_m(at), &|at| grid.point_ned_m(at)),
+        // Colours of heights have a light of their own, but for that of the scene.
+        None => shade::relief(dem.size, heights.range_m, &|at| dem.height_m(at), &|at| grid.point_ned_m(at), light.is_none()),
     };
     let [cols, rows] = dem.size;
     let made = Terrain::of_grid(cols, rows, &grid, Arc::new(texture));
     if grid.outside_crs.load(Ordering::Relaxed) {
         return Err(TerrainFileError::OutsideCrs { path: dem.path.clone(), epsg: dem.crs.epsg, count: dem.count_outside_crs() });
     }
-    let terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
+    let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
     let outside_ortho = count_outside(&terrain);
     if let Some(ortho) = spec.ortho.as_ref().filter(|_| outside_ortho == dem.points()) {
         return Err(TerrainFileError::NoOverlap { ortho: ortho.clone(), dem: dem.path.clone() });
+    }
+    if let Some(light) = light {
+        terrain.light_up(light);
     }
     let summary = grid.summary(&heights, outside_ortho);
     Ok(LoadedTerrain { terrain, summary })

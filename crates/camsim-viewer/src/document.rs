@@ -274,7 +274,7 @@ fn find<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     Some(value)
 }
 
-/// Tables on the way are made; an index beyond the end of a list does nothing.
+/// Tables on the way are made, and go when nothing is left in them; an index beyond the end of a list does nothing.
 fn place(table: &mut Table, key: &str, value: Option<Value>) {
     match key.split_once('.') {
         None => {
@@ -284,7 +284,12 @@ fn place(table: &mut Table, key: &str, value: Option<Value>) {
             };
         }
         Some((first, rest)) => match table.entry(first).or_insert_with(|| Value::Table(Table::new())) {
-            Value::Table(inner) => place(inner, rest, value),
+            Value::Table(inner) => {
+                place(inner, rest, value);
+                if inner.is_empty() {
+                    table.remove(first);
+                }
+            }
             Value::Array(array) => place_in_array(array, rest, value),
             _ => {}
         },

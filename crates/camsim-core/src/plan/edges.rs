@@ -307,7 +307,7 @@ fn cell(corners: [DVec3; 4], at_rim: bool) -> Patch {
 
 /// All triangles in one plane and turned the same way, and no corner outside of a border edge (one that a single triangle has).
 fn is_flat_convex(mesh: &Mesh) -> bool {
-    let Shape { vertices, indices } = &*mesh.shape;
+    let Shape { vertices, indices, .. } = &*mesh.shape;
     // What has holes, or is not there from behind, covers nothing for certain.
     let whole = mesh.material.cutoff.is_none() && !mesh.material.one_sided;
     if vertices.len() > MAX_FLAT_VERTICES || indices.len() < 3 || !whole {

@@ -35,7 +35,7 @@ pub(super) struct Met {
     pub surface: usize,
     /// Texture coordinates there.
     pub uv: [f64; 2],
-    /// Factor of the texture's colour there.
+    /// Factor of the texture's colour there, light included.
     pub tint: DVec3,
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
@@ -96,7 +96,8 @@ impl Surfaces {
         };
         let (depth_m, (corners, weights)) = self.shapes[i].first(origin, direction, limit, meet)?;
         let [r, g, b, _] = mesh.tint_at(corners, weights);
-        Some(Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: DVec3::new(r, g, b), terrain: None })
+        let light = self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
+        Some(Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: light * DVec3::new(r, g, b), terrain: None })
     }
 
     /// Place in the picture on what a ray met, texels.

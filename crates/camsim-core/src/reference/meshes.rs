@@ -9,7 +9,7 @@ use super::{
     paint::Coat,
     ray::{Bounds, Ray, meet},
 };
-use crate::scene::{Mesh, Shape};
+use crate::scene::{Light, Mesh, Shape};
 
 /// Triangles of a leaf, at most.
 const LEAF: usize = 4;
@@ -32,6 +32,8 @@ struct Cover {
     one_sided: bool,
     /// The picture and the alpha below which there is a hole.
     holes: Option<(Coat, f64)>,
+    /// By corner of the shape, its outward normal as it stands; none where no light falls.
+    normals: Vec<DVec3>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -50,13 +52,14 @@ pub(super) struct Meshes {
     nodes: Vec<Node>,
     /// By mesh.
     covers: Vec<Cover>,
+    light: Option<Light>,
 }
 
 impl Meshes {
-    pub(super) fn new(meshes: &[Mesh]) -> Self {
+    pub(super) fn new(meshes: &[Mesh], light: Option<Light>) -> Self {
         let mut triangles = Vec::new();
         for (surface, mesh) in (1..).zip(meshes) {
-            let Shape { vertices, indices } = &*mesh.shape;
+            let Shape { vertices, indices, .. } = &*mesh.shape;
             for (first, of) in (0..).step_by(3).zip(indices.chunks_exact(3)) {
                 let of = [of[0], of[1], of[2]];
                 if of.iter().any(|&corner| corner as usize >= vertices.len()) {
@@ -75,13 +78,14 @@ impl Meshes {
             shape: mesh.shape.clone(),
             one_sided: mesh.material.one_sided,
             holes: mesh.material.cutoff.map(|cutoff| (Coat::new(&mesh.material), f64::from(cutoff))),
+            normals: if light.is_some() { standing_normals(mesh) } else { Vec::new() },
         };
         let covers = meshes.iter().map(cover).collect();
         let mut nodes = Vec::new();
         if !triangles.is_empty() {
             build(&mut triangles, 0, &mut nodes);
         }
-        Self { triangles, nodes, covers }
+        Self { triangles, nodes, covers, light }
     }
 
     /// The first meeting before `limit`.
@@ -140,14 +144,46 @@ impl Meshes {
             return None;
         }
         let of = [0, 1, 2].map(|k| &cover.shape.vertices[cover.shape.indices[triangle.first as usize + k] as usize]);
-        let [red, green, blue, alpha] =
+        let [red, green, blue, alpha]: [f64; 4] =
             [0, 1, 2, 3].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(of[corner].tint[k])).sum());
         let hit = ray_hit(ray, t, weights, of.map(|vertex| vertex.uv), triangle.surface);
         if cover.holes.as_ref().is_some_and(|(coat, cutoff)| coat.alpha_at(hit.texture_uv) * alpha < *cutoff) {
             return None;
         }
-        Some(Hit { tint: [red, green, blue], ..hit })
+        let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray.direction));
+        Some(Hit { tint: [red, green, blue].map(|part| part * lit), ..hit })
     }
+}
+
+/// What of its light comes back from a place of a triangle, towards where the ray comes from: the sun's by the cosine of its angle, the sky's by
+/// the share of it that the face looks at.
+fn lit(light: &Light, cover: &Cover, triangle: &Triangle, weights: [f64; 3], direction: DVec3) -> f64 {
+    if cover.normals.is_empty() {
+        return 1.0;
+    }
+    let [a, b, c] = triangle.corners;
+    let from_behind = (b - a).cross(c - a).dot(direction) >= 0.0;
+    let corner = |k: usize| weights[k] * cover.normals[cover.shape.indices[triangle.first as usize + k] as usize];
+    let normal = (corner(0) + corner(1) + corner(2)) * if from_behind { -1.0 } else { 1.0 };
+    let of_sun = light.to_sun_ned.dot(normal).max(0.0);
+    let of_sky = 0.5 + 0.5 * -normal.z;
+    light.sun * of_sun + light.sky * of_sky
+}
+
+/// Outward normals of a shape's corners once it stands: across two directions that lay across the normal before. (The renderer takes cofactors.)
+fn standing_normals(mesh: &Mesh) -> Vec<DVec3> {
+    if mesh.shape.normals.len() != mesh.shape.vertices.len() {
+        return Vec::new();
+    }
+    let mirrored = mesh.ned_from_shape.determinant() < 0.0;
+    let standing = |normal: &[f32; 3]| {
+        let normal = DVec3::from_array(normal.map(f64::from));
+        let (along, across) = normal.normalize_or(DVec3::X).any_orthonormal_pair();
+        let (along, across) = (mesh.ned_from_shape * along, mesh.ned_from_shape * across);
+        let found = if mirrored { across.cross(along) } else { along.cross(across) };
+        if normal == DVec3::ZERO { normal } else { found.normalize_or_zero() }
+    };
+    mesh.shape.normals.iter().map(standing).collect()
 }
 
 /// The hit of a ray on a triangle.

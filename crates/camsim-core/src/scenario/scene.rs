@@ -26,6 +26,29 @@ pub struct SceneSpec {
     /// Visibility V: colour is mixed with the sky by 1 - exp(-3.912 d / V), d = slant range.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
+    /// Sun and sky; left out, colours are as they are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightSpec>,
+}
+
+/// `scene.light`: factor of the colours of terrain and models, without shadows.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LightSpec {
+    /// Where the sun is, degrees east of north.
+    pub sun_azimuth_deg: f64,
+    /// How high it is above the horizon, degrees.
+    pub sun_elevation_deg: f64,
+    /// Of a colour that the sun meets at right angles.
+    pub sun: f64,
+    /// Of a colour that looks up; half of it for walls.
+    pub sky: f64,
+}
+
+impl Default for LightSpec {
+    fn default() -> Self {
+        Self { sun_azimuth_deg: 180.0, sun_elevation_deg: 45.0, sun: 0.8, sky: 0.2 }
+    }
 }
 
 /// `scene.terrain`.

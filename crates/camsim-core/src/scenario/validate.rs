@@ -2,14 +2,10 @@
 
 use std::fmt;
 
-use super::{
-    Auto, Axis, BoardSpec, CameraSpec, FieldOr, LensModel, Origin, PatternCentre, Preset, QualitySpec, Scenario, Silhouettes, Solver,
-    TrackerSpec,
-};
-use crate::{
-    plan::MAX_KEYS,
-    scene::{Board, BoardError},
-};
+use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec};
+use crate::plan::MAX_KEYS;
+
+mod scene;
 
 /// Most depth look-ups of `reproject`. The planner takes 8 at most: a pixel that has not settled after these never does.
 pub const MAX_ITERATIONS: u32 = 64;
@@ -41,7 +37,7 @@ pub fn validate(scenario: &Scenario) -> Vec<Problem> {
     check_flight(&mut check, scenario);
     check_tracker(&mut check, &scenario.tracker);
     check_camera(&mut check, &scenario.camera);
-    check_scene(&mut check, scenario);
+    scene::check_scene(&mut check, &scenario.scene);
     check_quality_and_output(&mut check, scenario);
     check.problems
 }
@@ -201,70 +197,6 @@ fn check_coefficients(check: &mut Check, key: &str, model: LensModel, coefficien
         .require(!radial_alone, key, || format!("has 3 values; {order}: write k1, k2, 0, 0, k3 if they are radial, k1, k2, p1, p2 if not"));
 }
 
-fn check_scene(check: &mut Check, scenario: &Scenario) {
-    let scene = &scenario.scene;
-    let has_surface = scene.terrain.is_some() || scene.pattern.is_some() || scene.board.is_some() || !scene.gltf.is_empty();
-    check.require(has_surface, "scene", || {
-        "is empty; give scene.terrain = { dem = \"dem.tif\" }, scene.pattern = { image = \"grid.png\", width_m = 100.0 }, a [scene.board] or a [[scene.gltf]]"
-            .into()
-    });
-    for (i, model) in scene.gltf.iter().enumerate() {
-        let table = format!("scene.gltf.{i}");
-        check_place(check, &table, model.at, model.geodetic);
-        check.finite(format!("{table}.heading_deg"), &[model.heading_deg]);
-        check.positive(format!("{table}.scale"), model.scale, "1 is as the file has it");
-        check.finite(format!("{table}.time_s"), &[model.time_s.unwrap_or(0.0)]);
-        check.require(!model.on_ground || scene.terrain.is_some(), format!("{table}.on_ground"), || {
-            "needs a terrain to stand on: give scene.terrain, or heights in the places".into()
-        });
-        let twice = model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
-        check.require(!twice, format!("{table}.placements"), || "takes the place of at and geodetic: leave those out".into());
-    }
-    if let Some(board) = &scene.board {
-        check_board(check, board);
-    }
-    if let Some(pattern) = &scene.pattern {
-        check.positive("scene.pattern.width_m", pattern.width_m, "give the width on the ground in metres");
-        if let PatternCentre::Ned(centre) = pattern.at {
-            check.finite("scene.pattern.at", &centre);
-        }
-    }
-    check.require(scene.sky.iter().all(|value| (0.0..=1.0).contains(value)), "scene.sky", || {
-        format!("must be sRGB values in 0..1, not {:?}; divide 8-bit values by 255", scene.sky)
-    });
-    if let Some(visibility_m) = scene.fog_visibility_m {
-        check.positive("scene.fog_visibility_m", visibility_m, "leave it out for clear air");
-    }
-}
-
-fn check_board(check: &mut Check, board: &BoardSpec) {
-    if board.target.is_none() {
-        if let Err(BoardError { key, message }) = Board::from_spec(board) {
-            check.fail(format!("scene.board.{key}"), message);
-        }
-    } else {
-        let given = board.kind.is_some() || board.columns.is_some() || board.rows.is_some() || board.size_m.is_some();
-        check.require(!given, "scene.board.target", || "takes the place of kind, columns, rows and size_m: leave those out".into());
-    }
-    check_place(check, "scene.board", board.at, board.geodetic);
-    check.finite("scene.board.angles_deg", &board.angles_deg);
-}
-
-/// Where something stands: in local north-east-down or on Earth, not both.
-fn check_place(check: &mut Check, table: &str, at: PatternCentre, geodetic: Option<[f64; 3]>) {
-    if let PatternCentre::Ned(centre) = at {
-        check.finite(format!("{table}.at"), &centre);
-    }
-    if let Some([lat_deg, lon_deg, height_m]) = geodetic {
-        let key = format!("{table}.geodetic");
-        let ok = lat_deg.abs() <= 90.0 && lon_deg.abs() <= 360.0 && height_m.is_finite();
-        check.require(ok, key.clone(), || {
-            format!("must be [latitude_deg -90..90, longitude_deg, height_m], not [{lat_deg}, {lon_deg}, {height_m}]")
-        });
-        check.require(at == PatternCentre::Origin, key, || format!("takes the place of {table}.at: leave one of them out"));
-    }
-}
-
 fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     let quality = &scenario.quality;
     if quality.preset == Preset::Paper {
@@ -331,7 +263,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::scenario::{FlightSpec, GltfSpec, LensSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
+    use crate::scenario::{BoardSpec, FlightSpec, GltfSpec, LensSpec, LightSpec, PatternSpec, SceneSpec, VibrationSpec, ZoomSpec};
 
     fn good() -> Scenario {
         Scenario {
@@ -441,6 +373,10 @@ mod tests {
             }),
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
+            ("scene.light.sun_azimuth_deg", |s| s.scene.light = Some(LightSpec { sun_azimuth_deg: f64::INFINITY, ..Default::default() })),
+            ("scene.light.sun_elevation_deg", |s| s.scene.light = Some(LightSpec { sun_elevation_deg: -1.0, ..Default::default() })),
+            ("scene.light.sun", |s| s.scene.light = Some(LightSpec { sun: f64::NAN, ..Default::default() })),
+            ("scene.light.sky", |s| s.scene.light = Some(LightSpec { sun: 0.8, sky: 0.3, ..Default::default() })),
             ("quality.preset", |s| {
                 s.quality.preset = Preset::Paper;
                 s.camera.lens.model = LensModel::KannalaBrandt;

@@ -101,15 +101,19 @@ impl BoxTree {
 
     fn nearest(&self, measure: &impl Fn(&Aabb) -> Option<f64>, of_leaf: impl Fn(&Node) -> f64) -> f64 {
         let mut nearest = f64::INFINITY;
-        let mut stack: Vec<usize> = self.nodes.first().map(|_| 0).into_iter().collect();
-        while let Some(at) = stack.pop() {
-            let node = &self.nodes[at];
+        let far = |at: usize| measure(&self.nodes[at].bounds).map(|distance| (distance, at));
+        let mut stack: Vec<(f64, usize)> = self.nodes.first().and_then(|_| far(0)).into_iter().collect();
+        while let Some((distance, at)) = stack.pop() {
             // Written so that a NaN distance goes nowhere.
-            if measure(&node.bounds).is_some_and(|distance| distance < nearest) {
+            if distance < nearest {
+                let node = &self.nodes[at];
                 if node.count > 0 {
                     nearest = nearest.min(of_leaf(node));
                 } else {
-                    stack.extend([node.next as usize, at + 1]);
+                    let children = [far(at + 1), far(node.next as usize)];
+                    let swap = matches!(children, [Some(a), Some(b)] if a.0 < b.0);
+                    // The nearer one last, so that it comes off first.
+                    stack.extend(if swap { [children[1], children[0]] } else { children }.into_iter().flatten());
                 }
             }
         }

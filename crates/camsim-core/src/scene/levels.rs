@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{Aabb, Scene, Shape, in_view};
+use super::{Aabb, Mesh, Scene, Shape, in_view};
 use crate::pose::CameraPose;
 
 mod measure;
@@ -51,18 +51,21 @@ impl ShapeLevels {
     /// Simplifies a shape.
     #[must_use]
     pub fn new(shape: &Shape) -> Self {
-        let mut found = Self::full(shape);
-        let triangles = shape.indices.len() / 3;
         let is_sound = shape.indices.iter().all(|&corner| (corner as usize) < shape.vertices.len());
-        if !(FEWEST_TRIANGLES..=MOST_TRIANGLES).contains(&triangles) || !is_sound {
-            return found;
+        if !(FEWEST_TRIANGLES..=MOST_TRIANGLES).contains(&(shape.indices.len() / 3)) || !is_sound {
+            return Self::full(shape);
         }
+        if shape.has_normals() { Self::simplified::<{ space::LIT }>(shape) } else { Self::simplified::<{ space::UNLIT }>(shape) }
+    }
+
+    fn simplified<const AXES: usize>(shape: &Shape) -> Self {
+        let mut found = Self::full(shape);
         let bounds = shape.bounds();
         let diagonal_m = (bounds.max - bounds.min).length();
-        let mut simplifier = Simplifier::new(shape);
+        let mut simplifier = Simplifier::<AXES>::new(shape);
         let full = simplifier.left();
         let hair_m = 1e-9 * (diagonal_m + bounds.min.abs().max(bounds.max.abs()).max_element());
-        let (mut count, mut least_m) = (triangles, 0.0_f64);
+        let (mut count, mut least_m) = (shape.indices.len() / 3, 0.0_f64);
         for level in 0..LEVELS {
             simplifier.collapse_within(FINEST * diagonal_m * 2_f64.powi(level));
             if simplifier.count() as f64 > FEWER * count as f64 {
@@ -174,13 +177,22 @@ impl ModelDetail {
         for i in in_view(&bounds, pose, tolerance.tangents) {
             let (mesh, bounds) = (&scene.meshes[i as usize], &bounds[i as usize]);
             let levels = levels.of(&mesh.shape);
-            let level = levels.within(tolerance.error_m(bounds, pose) / stretch(&mesh.ned_from_shape));
+            let level = levels.within(tolerance.error_m(bounds, pose) / level_stretch(mesh));
             found.meshes += 1;
             found.triangles += levels.levels()[level].indices.len() as u64 / 3;
             found.finest_triangles += mesh.shape.indices.len() as u64 / 3;
         }
         found
     }
+}
+
+/// By how much a mesh stretches what its shape's levels are away from it. More than anything where light falls on a shape that is stretched in one
+/// direction more than in another: its normals turn towards each other and apart then, of which the levels know nothing.
+#[must_use]
+pub fn level_stretch(mesh: &Mesh) -> f64 {
+    let largest = stretch(&mesh.ned_from_shape);
+    let even = mesh.ned_from_shape.determinant().abs().cbrt();
+    if mesh.shape.has_normals() && largest > (1.0 + 1e-5) * even { f64::INFINITY } else { largest }
 }
 
 /// Largest factor by which a matrix stretches anything: exact where it turns and scales, else a bound.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::{Aabb, Texture, terrain::intersect_triangle, texture::Wrap};
+use super::{Aabb, Light, Texture, light::turned_normal, terrain::intersect_triangle, texture::Wrap};
 
 /// A corner of a [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,9 +38,17 @@ pub struct Shape {
     pub vertices: Vec<MeshVertex>,
     /// Three a triangle, each below `vertices.len()`.
     pub indices: Vec<u32>,
+    /// Outward unit normals of the corners, in the shape's own axes; none for what no light falls on.
+    pub normals: Vec<[f32; 3]>,
 }
 
 impl Shape {
+    /// Whether light falls on it: each corner has a normal.
+    #[must_use]
+    pub fn has_normals(&self) -> bool {
+        !self.normals.is_empty() && self.normals.len() == self.vertices.len()
+    }
+
     /// Smallest box around the corners, in the shape's own axes.
     pub(crate) fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
@@ -101,7 +109,7 @@ pub struct Mesh {
 impl Mesh {
     /// A mesh whose corners are in north-east-down from `origin_ned_m`, three `indices` a triangle.
     pub fn new(vertices: Vec<MeshVertex>, indices: Vec<u32>, texture: Arc<Texture>, origin_ned_m: DVec3, wrap: Wrap) -> Self {
-        let shape = Arc::new(Shape { vertices, indices });
+        let shape = Arc::new(Shape { vertices, indices, normals: Vec::new() });
         Self { shape, material: Material::picture(texture, wrap), origin_ned_m, ned_from_shape: DMat3::IDENTITY }
     }
 
@@ -173,6 +181,22 @@ impl Mesh {
     pub(crate) fn tint_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 4] {
         let of = corners.map(|v| self.shape.vertices[v as usize].tint);
         [0, 1, 2, 3].map(|channel: usize| (0..3).map(|k| weights[k] * f64::from(of[k][channel])).sum())
+    }
+
+    /// Factor of the picture's colour between three corners, seen along a direction: light on the side that is seen, or 1 without normals.
+    pub(crate) fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
+        if !self.shape.has_normals() {
+            return 1.0;
+        }
+        let outward: DVec3 = (0..3).map(|k| weights[k] * self.normal_ned(corners[k])).sum();
+        let [a, b, c] = corners.map(|v| self.position_ned_m(v));
+        let is_front = (b - a).cross(c - a).dot(direction_ned) < 0.0;
+        light.on(if is_front { outward } else { -outward })
+    }
+
+    /// A corner's normal as the mesh stands.
+    fn normal_ned(&self, vertex: u32) -> DVec3 {
+        turned_normal(&self.ned_from_shape, glam::Vec3::from(self.shape.normals[vertex as usize]).as_dvec3())
     }
 }
 

@@ -81,6 +81,9 @@ pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePi
         }
         pass.set_bind_group(1, group, &[]);
         pass.set_vertex_buffer(0, batch.vertices.slice(..));
+        if let Some(normals) = &batch.normals {
+            pass.set_vertex_buffer(1, normals.slice(..));
+        }
         pass.set_index_buffer(batch.indices.slice(..), wgpu::IndexFormat::Uint32);
         for (indices, instances) in batch.ranges.iter().zip(drawn).filter(|(_, instances)| !instances.is_empty()) {
             pass.draw_indexed(indices.clone(), 0, instances.clone());

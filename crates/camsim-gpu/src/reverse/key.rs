@@ -340,8 +340,14 @@ mod tests {
             let files = if key.edges == EdgeKind::None { vec![SHADER] } else { vec![SHADER, CANDIDATES_SHADER, RAYS_SHADER] };
             files.into_iter().map(move |file| (format!("{file} {key:?}"), shaders::compose(file, &key.slots()).unwrap()))
         });
-        let surfaces =
-            [("ideal/terrain.wgsl", false), ("ideal/terrain.wgsl", true), ("ideal/mesh.wgsl", false), ("ideal/mesh_holes.wgsl", false)];
+        let surfaces = [
+            ("ideal/terrain.wgsl", false),
+            ("ideal/terrain.wgsl", true),
+            ("ideal/mesh.wgsl", false),
+            ("ideal/mesh_lit.wgsl", false),
+            ("ideal/mesh_holes.wgsl", false),
+            ("ideal/mesh_holes_lit.wgsl", false),
+        ];
         let surfaces = surfaces.into_iter().flat_map(|(file, tiles)| {
             SurfaceReads::ALL.map(|reads| {
                 let slots = [crate::ideal::reads_slot(reads), crate::ideal::picture_slot(tiles)];
@@ -357,7 +363,7 @@ mod tests {
         for (name, text) in texts.chain(surfaces).chain(marks).chain(others) {
             let module = naga::front::wgsl::parse_str(&text).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&text)));
             // Holes are looked for sample by sample: all but the oldest adapters can.
-            let holes = name.starts_with("ideal/mesh_holes.wgsl");
+            let holes = name.starts_with("ideal/mesh_holes");
             let capabilities = if holes { naga::valid::Capabilities::MULTISAMPLED_SHADING } else { naga::valid::Capabilities::empty() };
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));

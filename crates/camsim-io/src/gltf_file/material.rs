@@ -28,6 +28,8 @@ pub(super) struct UvRule {
     pub vertex_colors: bool,
     /// Whether they should and cannot, as what is emitted is in the same picture.
     pub loses_colors: bool,
+    /// Whether the scene's light falls on it: not on what is unlit by name or shines by itself.
+    pub takes_light: bool,
 }
 
 /// A picture, its behaviour outside of it and whether its texels have sharp borders.
@@ -58,8 +60,16 @@ impl<'a> Materials<'a> {
         let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
         let emits = emitted.iter().any(|&part| part > 0.0);
         let black = factor[..3].iter().all(|&part| part == 0.0);
-        let mut rule =
-            UvRule { set: 0, offset: [0.0; 2], rotation: 0.0, scale: [1.0; 2], factor, vertex_colors: true, loses_colors: false };
+        let mut rule = UvRule {
+            set: 0,
+            offset: [0.0; 2],
+            rotation: 0.0,
+            scale: [1.0; 2],
+            factor,
+            vertex_colors: true,
+            loses_colors: false,
+            takes_light: !material.unlit(),
+        };
         let mut emissive = [0.0; 3];
         let mut on_top = None;
         let info = match (base.base_color_texture(), material.emissive_texture()) {
@@ -67,6 +77,7 @@ impl<'a> Materials<'a> {
             (_, Some(info)) if emits && black => {
                 rule.factor = [emitted[0], emitted[1], emitted[2], 1.0];
                 rule.vertex_colors = false;
+                rule.takes_light = false;
                 Some(info)
             }
             (info, emissive_texture) => {
@@ -131,7 +142,7 @@ impl<'a> Materials<'a> {
             self.notes.push("a picture of emitted light that does not lie on its base colour texel by texel is left out".into());
             return Ok(None);
         };
-        *rule = UvRule { factor: [1.0, 1.0, 1.0, alpha], vertex_colors: false, loses_colors: true, ..*rule };
+        *rule = UvRule { factor: [1.0, 1.0, 1.0, alpha], vertex_colors: false, loses_colors: true, takes_light: false, ..*rule };
         Ok(Some((Arc::new(both), below.1, below.2)))
     }
 

@@ -1,10 +1,12 @@
 //! A primitive's triangles, with morph targets and skin applied.
 
-use camsim_core::scene::{MeshVertex, Shape};
-use glam::{DAffine3, DVec3};
+use std::ops::{Add, Mul};
+
+use camsim_core::scene::{MeshVertex, Shape, light::turned_normal};
+use glam::{DAffine3, DMat3, DVec3};
 use gltf::{Semantic, mesh::Mode};
 
-use super::{GltfError, accessor, material::UvRule, source::Source};
+use super::{GltfError, accessor, material::UvRule, normals, source::Source};
 
 /// How indices make triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +37,8 @@ pub(super) struct Making<'a> {
     pub weights: &'a [f64],
     /// From the bound shape to the model, by joint.
     pub joints: Option<&'a [DAffine3]>,
+    /// Whether light will fall on it.
+    pub normals: bool,
 }
 
 impl Making<'_> {
@@ -65,7 +69,41 @@ impl Making<'_> {
         if vertices.iter().any(|vertex| !vertex.position_m.iter().chain(&vertex.uv).chain(&vertex.tint).all(|part| part.is_finite())) {
             return Err(self.wrong(primitive, "a position, texture coordinate or colour is not a finite number"));
         }
-        Ok(Shape { vertices, indices: self.indices(primitive, count)? })
+        let indices = self.indices(primitive, count)?;
+        let given = if self.normals { self.given_normals(primitive, count)? } else { None };
+        Ok(match given {
+            Some(given) => {
+                let normals = normals::mended(given, &vertices, &indices, self.mirrored);
+                Shape { vertices, indices, normals }
+            }
+            None if self.normals => normals::flat(&vertices, &indices, self.mirrored),
+            None => Shape { vertices, indices, normals: Vec::new() },
+        })
+    }
+
+    /// The file's own normals, of any length.
+    fn given_normals(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Option<Vec<DVec3>>, GltfError> {
+        let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };
+        let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
+        let mut normals: Vec<DVec3> = accessor::rows(self.source, &accessor)?.into_iter().map(vector).collect();
+        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
+            let Some(accessor) = target.normals() else { continue };
+            let shifts = accessor::rows(self.source, &accessor)?;
+            if shifts.len() != normals.len() {
+                return Err(self.wrong(primitive, "a morph target has another number of elements"));
+            }
+            normals.iter_mut().zip(shifts).for_each(|(normal, shift)| *normal += weight * vector(shift));
+        }
+        if normals.len() != count {
+            return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
+        }
+        if let Some(joints) = self.joints {
+            let matrices = self.blended(primitive, joints, count, DMat3::ZERO, |joint, _| joint.matrix3)?;
+            normals.iter_mut().zip(matrices).filter(|(_, (_, weight))| *weight > 0.0).for_each(|(normal, (matrix, _))| {
+                *normal = turned_normal(&matrix, *normal);
+            });
+        }
+        Ok(Some(normals))
     }
 
     fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
@@ -90,29 +128,46 @@ impl Making<'_> {
         Ok(positions)
     }
 
-    /// Each corner goes with up to four joints of each set.
     fn bend(&self, primitive: &gltf::Primitive<'_>, joints: &[DAffine3], positions: &mut [DVec3]) -> Result<(), GltfError> {
-        let mut bent = vec![(DVec3::ZERO, 0.0); positions.len()];
-        for set in 0.. {
-            let (Some(of), Some(by)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else { break };
-            let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
-            if of.len() != positions.len() || by.len() != positions.len() {
-                return Err(self.wrong(primitive, "its joints or weights have another number of elements"));
-            }
-            for (i, (position, sum)) in positions.iter().zip(&mut bent).enumerate() {
-                for k in (0..4).filter(|&k| by[i][k] > 0.0) {
-                    let joint =
-                        joints.get(of[i][k] as usize).ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
-                    *sum = (sum.0 + by[i][k] * joint.transform_point3(*position), sum.1 + by[i][k]);
-                }
-            }
-        }
+        let bent =
+            self.blended(primitive, joints, positions.len(), DVec3::ZERO, |joint, corner| joint.transform_point3(positions[corner]))?;
         positions
             .iter_mut()
             .zip(bent)
             .filter(|(_, (_, weight))| *weight > 0.0)
             .for_each(|(position, (sum, weight))| *position = sum / weight);
         Ok(())
+    }
+
+    /// Each corner goes with up to four joints of each set: what they make of it, times their weights, and the sum of those.
+    fn blended<T>(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        joints: &[DAffine3],
+        count: usize,
+        zero: T,
+        by_joint: impl Fn(&DAffine3, usize) -> T,
+    ) -> Result<Vec<(T, f64)>, GltfError>
+    where
+        T: Copy + Add<Output = T>,
+        f64: Mul<T, Output = T>,
+    {
+        let mut bent = vec![(zero, 0.0); count];
+        for set in 0.. {
+            let (Some(of), Some(by)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else { break };
+            let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
+            if of.len() != count || by.len() != count {
+                return Err(self.wrong(primitive, "its joints or weights have another number of elements"));
+            }
+            for (i, sum) in bent.iter_mut().enumerate() {
+                for k in (0..4).filter(|&k| by[i][k] > 0.0) {
+                    let joint =
+                        joints.get(of[i][k] as usize).ok_or_else(|| self.wrong(primitive, "names a joint that its skin does not have"))?;
+                    *sum = (sum.0 + by[i][k] * by_joint(joint, i), sum.1 + by[i][k]);
+                }
+            }
+        }
+        Ok(bent)
     }
 
     fn indices(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Vec<u32>, GltfError> {

@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+use camsim_core::scene::{MeshVertex, light::turned_normal};
 use glam::DVec2;
 
 use super::*;
@@ -28,6 +29,10 @@ fn floats(values: &[f32]) -> Vec<u8> {
 
 /// A square of four corners, (0, 0) to (1, 1), as `mode`; `more` follows the primitive.
 fn square(mode: u32, more: &str, nodes: &str) -> Result<Model, String> {
+    square_with(mode, more, nodes, GltfOptions::default())
+}
+
+fn square_with(mode: u32, more: &str, nodes: &str, options: GltfOptions) -> Result<Model, String> {
     let bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
     let rest = format!(
         r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}],
@@ -35,7 +40,7 @@ fn square(mode: u32, more: &str, nodes: &str) -> Result<Model, String> {
         "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}, "mode": {mode} {more} }}] }}],
         "nodes": [{nodes}], "scenes": [{{ "nodes": [0] }}]"#
     );
-    model(&bytes, &rest, GltfOptions::default())
+    model(&bytes, &rest, options)
 }
 
 /// Corners of a placed model, north-east-down, triangle by triangle.
@@ -229,9 +234,101 @@ fn texture_coordinates_are_turned_as_their_extension_says() {
         factor: [1.0; 4],
         vertex_colors: true,
         loses_colors: false,
+        takes_light: true,
     };
     let at = |rule: material::UvRule, uv: [f64; 2]| DVec2::from_array(rule.apply(uv).map(f64::from));
     assert!(at(rule(0.0, [0.5, -0.25], [2.0, 3.0]), [0.1, 0.2]).distance(DVec2::new(0.7, 0.35)) < 1e-6);
     // A quarter anticlockwise as one sees it, where v goes down: u becomes -v.
     assert!(at(rule(std::f64::consts::FRAC_PI_2, [0.0; 2], [1.0; 2]), [1.0, 0.0]).distance(DVec2::new(0.0, -1.0)) < 1e-6);
+}
+
+const WITH_NORMALS: GltfOptions = GltfOptions { normals: true, scene: None, time_s: None, animation: None };
+
+/// Normals of a model's corners as it stands.
+fn standing(model: &Model, heading_rad: f64) -> Vec<DVec3> {
+    let of = |mesh: Mesh| {
+        let turned = |normal: &[f32; 3]| turned_normal(&mesh.ned_from_shape, DVec3::from_array(normal.map(f64::from)));
+        mesh.shape.normals.iter().map(turned).collect::<Vec<_>>()
+    };
+    model.place(DVec3::ZERO, heading_rad, 2.0).flat_map(of).collect()
+}
+
+#[test]
+fn flat_triangles_look_where_they_turn_to() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    for (nodes, heading_rad, expected) in [
+        (r#"{ "mesh": 0 }"#, 0.0, DVec3::X),
+        (r#"{ "mesh": 0 }"#, quarter, DVec3::Y),
+        (r#"{ "mesh": 0, "scale": [1, 1, -2] }"#, 0.0, -DVec3::X),
+        (r#"{ "mesh": 0, "scale": [-1, 1, 1] }"#, quarter, DVec3::Y),
+        // Turned about x, so that it looks down; stretched, which changes nothing of a face.
+        (r#"{ "mesh": 0, "rotation": [0.70710678, 0, 0, 0.70710678], "scale": [5, 1, 3] }"#, 0.3, DVec3::Z),
+    ] {
+        let model = square_with(5, "", nodes, WITH_NORMALS).unwrap();
+        let found = standing(&model, heading_rad);
+        assert_eq!(found.len(), 4, "both triangles share their corners");
+        assert!(found.iter().all(|normal| normal.distance(expected) < 2e-6), "{nodes}: {found:?}");
+        assert_eq!(corners(&model), corners(&square_with(5, "", nodes, GltfOptions::default()).unwrap()));
+    }
+    assert!(standing(&square(5, "", r#"{ "mesh": 0 }"#).unwrap(), 0.0).is_empty());
+}
+
+#[test]
+fn planes_do_not_share_corners_and_given_normals_are_mended() {
+    // Two faces of a tent.
+    let at = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|at| MeshVertex::new(at, [0.0; 2]));
+    let shape = normals::flat(&at, &[0, 1, 2, 0, 2, 3], false);
+    assert_eq!((shape.vertices.len(), shape.indices.len()), (6, 6));
+    let normal = |k: usize| shape.normals[shape.indices[k] as usize];
+    assert_eq!([normal(0), normal(2), normal(3), normal(5)], [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]);
+    let given = vec![DVec3::new(0.0, 0.0, 4.0), DVec3::ZERO, DVec3::NAN, DVec3::new(3.0, 0.0, -4.0)];
+    let mended = normals::mended(given, &at, &[0, 1, 2, 0, 2, 3], false);
+    let between = 0.5_f32.sqrt();
+    for (found, expected) in mended.into_iter().zip([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [between, 0.0, between], [0.6, 0.0, -0.8]]) {
+        assert!(DVec3::from_array(found.map(f64::from)).distance(DVec3::from_array(expected.map(f64::from))) < 1e-6, "{found:?}");
+    }
+}
+
+#[test]
+fn light_falls_on_nothing_that_is_unlit_or_shines() {
+    for (material, lit) in
+        [(r#"{}"#, true), (r#"{ "emissiveFactor": [0.5, 0, 0] }"#, true), (r#"{ "extensions": { "KHR_materials_unlit": {} } }"#, false)]
+    {
+        let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
+        let model = square_with(5, &rest, r#"{ "mesh": 0 }"#, WITH_NORMALS).unwrap();
+        assert_eq!(!standing(&model, 0.0).is_empty(), lit, "{material}");
+    }
+}
+
+#[test]
+fn normals_of_real_models_look_outwards_wherever_joints_take_them() {
+    let Some(data) = data() else { return };
+    for (name, time_s) in [
+        ("CesiumMilkTruck/glTF-Binary/CesiumMilkTruck.glb", None),
+        ("Fox/glTF-Binary/Fox.glb", None),
+        ("Fox/glTF-Binary/Fox.glb", Some(0.4)),
+        ("RecursiveSkeletons/glTF-Binary/RecursiveSkeletons.glb", Some(0.5)),
+        ("AnimatedMorphCube/glTF-Binary/AnimatedMorphCube.glb", Some(1.1)),
+        ("Box/glTF-Binary/Box.glb", None),
+    ] {
+        let read = |normals: bool| read_gltf(&data.join(name), GltfOptions { time_s, normals, ..GltfOptions::default() }).unwrap();
+        let (model, plain) = (read(true), read(false));
+        assert_eq!(corners(&model), corners(&plain), "{name}");
+        let (mut outwards, mut all) = (0.0, 0.0);
+        for mesh in model.place(DVec3::ZERO, 0.4, 1.0) {
+            assert!(mesh.shape.has_normals(), "{name}");
+            for triangle in mesh.shape.indices.chunks_exact(3) {
+                let [a, b, c] = [0, 1, 2].map(|k| mesh.position_ned_m(triangle[k]));
+                let face = (b - a).cross(c - a);
+                for &corner in triangle {
+                    let normal = turned_normal(&mesh.ned_from_shape, DVec3::from_array(mesh.shape.normals[corner as usize].map(f64::from)));
+                    assert!((normal.length() - 1.0).abs() < 1e-9, "{name}");
+                    all += face.length();
+                    outwards += if normal.dot(face) > 0.5 * face.length() { face.length() } else { 0.0 };
+                }
+            }
+        }
+        eprintln!("{name} {time_s:?}: {:.4} of the area has normals within 60 degrees of its faces'", outwards / all);
+        assert!(outwards > 0.9 * all, "{name}: {outwards} of {all}");
+    }
 }

@@ -5,8 +5,8 @@ use std::{cell::RefCell, sync::Arc};
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
-    scenario::{BoardSpec, GltfSpec, PatternCentre, Scenario},
-    scene::{Encoding, Mesh, Scene, linear_from_srgb, ned_from_board},
+    scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
+    scene::{Encoding, Light, Mesh, Scene, linear_from_srgb, ned_from_board},
 };
 use glam::DVec3;
 
@@ -18,13 +18,17 @@ use crate::{
     board_file::read_board,
     gltf_file::{GltfOptions, read_gltf},
     pictures::read_texture,
-    terrain::{TerrainSummary, read_terrain},
+    terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
 };
 
 /// Reads what `[scene]` names.
 pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene, Option<TerrainSummary>, Vec<String>), LoadError> {
     let spec = &scenario.scene;
+    let light = spec.light.map(|LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky }| {
+        Light::new(sun_azimuth_deg.to_radians(), sun_elevation_deg.to_radians(), sun, sky)
+    });
     let mut scene = Scene {
+        light,
         sky_linear: spec.sky.map(|value| linear_from_srgb(value as f32)),
         fog_visibility_m: spec.fog_visibility_m,
         ..Scene::default()
@@ -34,7 +38,8 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
         let ned = |lat_rad, lon_rad, height_m| frame.ned_from_geodetic(Geodetic { lat_rad, lon_rad, height_m });
         let (_, shift_terrain) = height_plan(scenario);
-        let loaded = read_terrain(terrain, &ned, if shift_terrain { Some(&undulation) } else { None })?;
+        let shift = if shift_terrain { Some(&undulation as HeightShift<'_>) } else { None };
+        let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
         summary = Some(loaded.summary);
     }
@@ -56,7 +61,13 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
 /// A model wherever it is to stand; gives what there is to say about it.
 fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut Scene) -> Result<Vec<String>, LoadError> {
     let number = |n: Option<u32>| n.map(|n| n as usize);
-    let model = read_gltf(&spec.file, GltfOptions { scene: number(spec.scene), time_s: spec.time_s, animation: number(spec.animation) })?;
+    let options = GltfOptions {
+        scene: number(spec.scene),
+        time_s: spec.time_s,
+        animation: number(spec.animation),
+        normals: scenario.scene.light.is_some(),
+    };
+    let model = read_gltf(&spec.file, options)?;
     let places = match &spec.placements {
         None => vec![Placement { place: (spec.at, spec.geodetic), heading_deg: 0.0, scale: 1.0 }],
         Some(path) => read_placements(path, spec.on_ground)?,

@@ -55,7 +55,7 @@ fn every_word_of_the_schema_is_known_to_the_structs() {
 #[test]
 fn every_key_of_the_structs_is_in_the_schema() {
     let mut text = print_default();
-    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "gltf", "fog_visibility_m"] {
+    for commented in ["window_s", "principal_point_px", "zoom_track", "vignette", "pattern", "board", "gltf", "fog_visibility_m", "light"] {
         text = text.replace(&format!("# {commented} = "), &format!("{commented} = "));
     }
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";

@@ -1,4 +1,4 @@
-//! Colour for terrain without a picture: tinted by height, shaded from the north-west.
+//! Colour for terrain without a picture: tinted by height, shaded from the north-west if the scene has no light of its own.
 
 use camsim_core::scene::{Encoding, Texture};
 use glam::DVec3;
@@ -14,12 +14,13 @@ const AMBIENT: f64 = 0.35;
 /// Rows of a band, whose points are found together.
 const BAND_ROWS: usize = 32;
 
-/// One pixel a height; voids are transparent. `height_m` and `point_ned_m` by column and row.
+/// One pixel a height, `shaded` or not; voids are transparent. `height_m` and `point_ned_m` by column and row.
 pub(super) fn relief(
     size: [u32; 2],
     [low, high]: [f64; 2],
     height_m: &(dyn Fn([u32; 2]) -> f64 + Sync),
     point_ned_m: &(dyn Fn([u32; 2]) -> DVec3 + Sync),
+    shaded: bool,
 ) -> Texture {
     let [cols, rows] = size.map(|n| n as usize);
     // Towards a sun in the north-west, 45 degrees up.
@@ -42,7 +43,8 @@ pub(super) fn relief(
             // Beside a void there is no slope: then as level ground.
             let normal = southwards.cross(eastwards).try_normalize().unwrap_or(DVec3::NEG_Z);
             let upwards = if normal.z > 0.0 { -normal } else { normal };
-            let light = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
+            let relief = AMBIENT + (1.0 - AMBIENT) * upwards.dot(to_sun).max(0.0) / std::f64::consts::FRAC_1_SQRT_2;
+            let light = if shaded { relief } else { 1.0 };
             let share = if high > low { (height - low) / (high - low) } else { 0.0 };
             for (byte, tint) in pixel.iter_mut().zip(tint(share)) {
                 *byte = (tint * light).clamp(0.0, 255.0) as u8;

@@ -3,7 +3,10 @@
 
 use std::{fs, path::Path};
 
-use camsim_core::{pose::CameraPose, scene::TerrainDetail};
+use camsim_core::{
+    pose::CameraPose,
+    scene::{TerrainDetail, linear_from_srgb},
+};
 use glam::DQuat;
 use tiff::{
     encoder::{TiffEncoder, colortype},
@@ -320,6 +323,36 @@ fn all_real_terrains_load() {
         match terrain.down_at(middle.x, middle.y) {
             Some(down) => assert!((terrain.bounds.min.z..=terrain.bounds.max.z).contains(&down)),
             None => assert!(terrain.void_cells > 0, "{dem}"),
+        }
+    }
+}
+
+/// Without a picture the colours of heights have a shading of their own; in the scene's light they have that instead, not on top.
+#[test]
+fn the_scenes_light_takes_the_place_of_the_shading_of_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    // 40 % up to the east.
+    let heights: Vec<f32> = (0..12 * 10).map(|k| 4.0 * (k % 12) as f32).collect();
+    write_dem(&path, [12, 10], &heights, Some(&UTM));
+    let [lat, lon] = Crs::new(32632).unwrap().geodetic_from_model([500_000.0, 5_000_000.0]).unwrap();
+    let ned = frame([lat.to_degrees(), lon.to_degrees()], 0.0);
+    let picture = |light: Option<Light>| {
+        let loaded = read_terrain_in_light(&spec(&path, None), &ned, None, light.as_ref()).unwrap();
+        loaded.terrain.texture.rgba8.clone()
+    };
+    // Nothing but sky: level ground would be as it is.
+    let (open, half) = (Light::new(0.0, 0.5, 0.0, 1.0), Light::new(4.0, 0.9, 0.5, 0.25));
+    let up = DVec3::new(0.0, -0.4, -1.0).normalize();
+    let linear = |byte: u8| f64::from(linear_from_srgb(f32::from(byte) / 255.0));
+    let (bright, dim) = (picture(Some(open)), picture(Some(half)));
+    assert_ne!(picture(None), bright);
+    let ratio = half.on(up) / open.on(up);
+    for (a, b) in bright.chunks_exact(4).zip(dim.chunks_exact(4)) {
+        for (a, b) in a[..3].iter().zip(b) {
+            // Both are rounded to a byte of sRGB.
+            let [low, high] = [a.saturating_sub(1), a.saturating_add(1)].map(|a| linear(a) * ratio);
+            assert!(linear(b.saturating_sub(1)) <= high && linear(b.saturating_add(1)) >= low, "{a} {b} {ratio}");
         }
     }
 }

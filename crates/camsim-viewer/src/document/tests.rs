@@ -108,3 +108,14 @@ fn a_file_that_is_no_scenario_says_so() {
     let error = Document::open(&path).expect_err("not a scenario");
     assert!(error.contains("bad.toml:2") && error.contains("fps"), "{error}");
 }
+
+#[test]
+fn the_last_key_of_a_table_takes_the_table_with_it() {
+    let mut document = demo();
+    assert_eq!(document.scenario.scene.light, None);
+    document.set("scene.light.sun", Some(Value::Float(0.5)), false);
+    assert_eq!(document.scenario.scene.light.map(|light| light.sun), Some(0.5));
+    document.set("scene.light.sun", None, false);
+    // Else an empty table would be a light by default.
+    assert_eq!((document.scenario.scene.light, document.value("scene.light")), (None, None));
+}

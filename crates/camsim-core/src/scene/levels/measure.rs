@@ -14,7 +14,7 @@ const MOST_CUTS: u32 = 6;
 const WORTH: f64 = 1.1;
 
 /// Upper bound of the distance of either from the other; infinite if one of them is empty.
-pub(super) fn apart_m(points: &[Point], one: &[[u32; 3]], other: &[[u32; 3]], hair_m: f64) -> f64 {
+pub(super) fn apart_m<const AXES: usize>(points: &[Point<AXES>], one: &[[u32; 3]], other: &[[u32; 3]], hair_m: f64) -> f64 {
     if one.is_empty() || other.is_empty() {
         return f64::INFINITY;
     }
@@ -22,18 +22,18 @@ pub(super) fn apart_m(points: &[Point], one: &[[u32; 3]], other: &[[u32; 3]], ha
     Search::new(points, one, hair_m).farthest_m(other, one_way)
 }
 
-struct Search<'a> {
-    points: &'a [Point],
+struct Search<'a, const AXES: usize> {
+    points: &'a [Point<AXES>],
     triangles: &'a [[u32; 3]],
     tree: BoxTree,
 }
 
-fn place(point: &Point) -> DVec3 {
+fn place<const AXES: usize>(point: &Point<AXES>) -> DVec3 {
     DVec3::new(point[0], point[1], point[2])
 }
 
-impl<'a> Search<'a> {
-    fn new(points: &'a [Point], triangles: &'a [[u32; 3]], hair_m: f64) -> Self {
+impl<'a, const AXES: usize> Search<'a, AXES> {
+    fn new(points: &'a [Point<AXES>], triangles: &'a [[u32; 3]], hair_m: f64) -> Self {
         let boxed = |triangle: &[u32; 3]| {
             let mut bounds = Aabb::EMPTY;
             triangle.iter().for_each(|&corner| bounds.include(place(&points[corner as usize])));
@@ -42,47 +42,55 @@ impl<'a> Search<'a> {
         Self { points, triangles, tree: BoxTree::new(&triangles.iter().map(boxed).collect::<Vec<_>>()) }
     }
 
-    fn corners(&self, triangle: [u32; 3]) -> [&Point; 3] {
+    fn corners(&self, triangle: [u32; 3]) -> [&Point<AXES>; 3] {
         triangle.map(|corner| &self.points[corner as usize])
     }
 
-    /// Distance of the farthest point of `of`, if that is more than `known_m`.
+    /// Bound of the distance of the farthest point of `of`, and not less than `known_m`.
     fn farthest_m(&self, of: &[[u32; 3]], known_m: f64) -> f64 {
-        let mut farthest_m = known_m;
-        let mut waiting: Vec<([Point; 3], u32)> = Vec::new();
+        // What is known to be there, and what nothing exceeds: were the two one number, each part would raise what the next one is allowed.
+        let (mut least_m, mut most_m) = (known_m, known_m);
+        let mut waiting: Vec<([Point<AXES>; 3], u32)> = Vec::new();
         for &triangle in of {
             waiting.push((self.corners(triangle).map(|corner| *corner), 0));
             while let Some((corners, cuts)) = waiting.pop() {
-                let [at_least_m, at_most_m] = self.bounds_m(&corners);
-                farthest_m = farthest_m.max(at_least_m);
-                if at_most_m <= WORTH * farthest_m || cuts == MOST_CUTS {
-                    farthest_m = farthest_m.max(at_most_m);
+                let at_most_m = self.at_most_m(&corners);
+                let is_settled = |least_m: f64| at_most_m <= most_m.max(WORTH * least_m) || cuts == MOST_CUTS;
+                if !is_settled(least_m) {
+                    least_m = least_m.max(self.at_least_m(&corners));
+                }
+                if is_settled(least_m) {
+                    most_m = most_m.max(at_most_m);
                 } else {
                     waiting.extend(quarters(&corners).map(|part| (part, cuts + 1)));
                 }
             }
         }
-        farthest_m
+        most_m
     }
 
-    /// What the farthest point of a triangle is away, at least and at most.
-    fn bounds_m(&self, corners: &[Point; 3]) -> [f64; 2] {
-        let each2 = corners.each_ref().map(|corner| {
+    /// What the farthest point of a triangle is away, at least: its farthest corner.
+    fn at_least_m(&self, corners: &[Point<AXES>; 3]) -> f64 {
+        let each = corners.each_ref().map(|corner| {
             let of_triangle = |k: u32| distance2(corner, self.corners(self.triangles[k as usize])).sqrt();
             self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(corner))), of_triangle)
         });
-        let middle: Point = std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
+        each.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The same at most: by the one triangle that suits all its corners best.
+    fn at_most_m(&self, corners: &[Point<AXES>; 3]) -> f64 {
+        let middle: Point<AXES> = std::array::from_fn(|k| (corners[0][k] + corners[1][k] + corners[2][k]) / 3.0);
         let all = |k: u32| {
             let other = self.corners(self.triangles[k as usize]);
             corners.iter().map(|corner| distance2(corner, other)).fold(0.0, f64::max).sqrt()
         };
         // No triangle is nearer to the farthest corner than to the middle.
-        let at_most = self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(&middle))), all);
-        [each2.into_iter().fold(0.0, f64::max), at_most]
+        self.tree.nearest_thing_m(|bounds| Some(bounds.distance_m(place(&middle))), all)
     }
 }
 
-fn quarters([a, b, c]: &[Point; 3]) -> [[Point; 3]; 4] {
+fn quarters<const AXES: usize>([a, b, c]: &[Point<AXES>; 3]) -> [[Point<AXES>; 3]; 4] {
     let (ab, bc, ca) = (between(a, b), between(b, c), between(c, a));
     [[*a, ab, ca], [ab, *b, bc], [ca, bc, *c], [ab, bc, ca]]
 }
@@ -90,8 +98,9 @@ fn quarters([a, b, c]: &[Point; 3]) -> [[Point; 3]; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::levels::space::UNLIT;
 
-    fn point(x: f64, y: f64, z: f64) -> Point {
+    fn point(x: f64, y: f64, z: f64) -> Point<UNLIT> {
         [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
@@ -119,7 +128,7 @@ mod tests {
 
     #[test]
     fn other_colours_are_far() {
-        let points: Vec<Point> = [0.0, 5.0]
+        let points: Vec<Point<UNLIT>> = [0.0, 5.0]
             .into_iter()
             .flat_map(|tint| [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| [x, y, 0.0, 0.0, 0.0, tint, 0.0, 0.0, 0.0]))
             .collect();

@@ -19,9 +19,9 @@ const MOST_GONE: usize = 12;
 const LEAST_COSINE: f64 = 0.2;
 
 /// A shape whose triangles become fewer.
-pub(super) struct Simplifier {
+pub(super) struct Simplifier<const AXES: usize> {
     /// By vertex of the shape.
-    pub points: Vec<Point>,
+    pub points: Vec<Point<AXES>>,
     /// Three vertices each; of vertices that are equal the first stands for all.
     pub triangles: Vec<[u32; 3]>,
     alive: Vec<bool>,
@@ -68,15 +68,15 @@ struct Collapse {
     cost2: f64,
 }
 
-impl Simplifier {
+impl<const AXES: usize> Simplifier<AXES> {
     pub fn new(shape: &Shape) -> Self {
-        let space = Space::of(shape);
-        let points: Vec<Point> = shape.vertices.iter().map(|vertex| space.point(vertex)).collect();
+        let points = Space::of(shape).points(shape);
         let (mut same, mut places) = (HashMap::new(), HashMap::new());
         let bits = |values: &[f32]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u32>>();
+        let normal = |i: u32| shape.normals.get(i as usize).map_or_else(Vec::new, |normal| bits(normal));
         let first: Vec<u32> = (0..)
             .zip(&shape.vertices)
-            .map(|(i, MeshVertex { position_m, uv, tint })| *same.entry((bits(position_m), bits(uv), bits(tint))).or_insert(i))
+            .map(|(i, MeshVertex { position_m, uv, tint })| *same.entry((bits(position_m), bits(uv), bits(tint), normal(i))).or_insert(i))
             .collect();
         let place_of: Vec<u32> = (0..).zip(&shape.vertices).map(|(i, v)| *places.entry(bits(&v.position_m)).or_insert(i)).collect();
         let triangles: Vec<[u32; 3]> = shape
@@ -207,8 +207,8 @@ impl Simplifier {
     fn folds(&self, before: [u32; 3], after: [u32; 3]) -> bool {
         let normal = |of: [u32; 3]| {
             let [a, b, c] = of.map(|vertex| {
-                let [x, y, z, ..] = self.points[vertex as usize];
-                DVec3::new(x, y, z)
+                let point = &self.points[vertex as usize];
+                DVec3::new(point[0], point[1], point[2])
             });
             (b - a).cross(c - a)
         };

@@ -1,15 +1,18 @@
-//! Where simpler shapes are compared with the full one: a space of position, texture coordinates and colour, all in metres.
+//! Where simpler shapes are compared with the full one: a space of position, texture coordinates, colour and, where light falls, normal, all
+//! in metres.
 //!
 //! A point of a surface then has a place that says what is seen there, too, and one distance bounds them all: a surface within a
 //! distance of another one has each of its colours and each place of its picture within that distance.
 
 use crate::scene::{MeshVertex, Shape};
 
-/// Position, texture coordinates, tint.
-pub(super) const AXES: usize = 9;
+/// Axes of a shape without light: position, texture coordinates, tint.
+pub(super) const UNLIT: usize = 9;
+/// With light also the normal.
+pub(super) const LIT: usize = 12;
 
 /// A point of a surface and what is on it, metres.
-pub(super) type Point = [f64; AXES];
+pub(super) type Point<const AXES: usize> = [f64; AXES];
 
 /// How texture coordinates and colours of a shape become metres.
 #[derive(Clone, Copy, Debug)]
@@ -38,29 +41,35 @@ impl Space {
         Self { uv_m, tint_m: diagonal_m }
     }
 
-    /// A corner's.
-    pub fn point(&self, vertex: &MeshVertex) -> Point {
-        let [x, y, z] = vertex.position_m.map(f64::from);
-        let [u, v] = vertex.uv.map(|part| f64::from(part) * self.uv_m);
-        let [r, g, b, a] = vertex.tint.map(|part| f64::from(part) * self.tint_m);
-        [x, y, z, u, v, r, g, b, a]
+    /// Those of a shape's corners, in as many axes as there are. A normal of another direction is another colour: light differs by less than
+    /// normals do (`scene/light.rs`).
+    pub fn points<const AXES: usize>(&self, shape: &Shape) -> Vec<Point<AXES>> {
+        let point = |(i, vertex): (usize, &MeshVertex)| {
+            let [x, y, z] = vertex.position_m.map(f64::from);
+            let [u, v] = vertex.uv.map(|part| f64::from(part) * self.uv_m);
+            let [r, g, b, a] = vertex.tint.map(|part| f64::from(part) * self.tint_m);
+            let [n0, n1, n2] = shape.normals.get(i).map_or([0.0; 3], |normal| normal.map(|part| f64::from(part) * self.tint_m));
+            let all = [x, y, z, u, v, r, g, b, a, n0, n1, n2];
+            std::array::from_fn(|axis| all[axis])
+        };
+        shape.vertices.iter().enumerate().map(point).collect()
     }
 }
 
-pub(super) fn minus(a: &Point, b: &Point) -> Point {
+pub(super) fn minus<const AXES: usize>(a: &Point<AXES>, b: &Point<AXES>) -> Point<AXES> {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
-pub(super) fn dot(a: &Point, b: &Point) -> f64 {
+pub(super) fn dot<const AXES: usize>(a: &Point<AXES>, b: &Point<AXES>) -> f64 {
     (0..AXES).map(|k| a[k] * b[k]).sum()
 }
 
-pub(super) fn between(a: &Point, b: &Point) -> Point {
+pub(super) fn between<const AXES: usize>(a: &Point<AXES>, b: &Point<AXES>) -> Point<AXES> {
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
 
 /// Squared distance of a point from a triangle, which is a convex set: of no point between three others it is more than of the farthest one.
-pub(super) fn distance2(point: &Point, [a, b, c]: [&Point; 3]) -> f64 {
+pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Point<AXES>; 3]) -> f64 {
     let (e, f, v) = (minus(b, a), minus(c, a), minus(point, a));
     let (ee, ef, ff) = (dot(&e, &e), dot(&e, &f), dot(&f, &f));
     let (ev, fv) = (dot(&e, &v), dot(&f, &v));
@@ -68,18 +77,18 @@ pub(super) fn distance2(point: &Point, [a, b, c]: [&Point; 3]) -> f64 {
     if det > 1e-14 * ee * ff {
         let (s, t) = ((ff * ev - ef * fv) / det, (ee * fv - ef * ev) / det);
         if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
-            let left: Point = std::array::from_fn(|k| v[k] - s * e[k] - t * f[k]);
+            let left: Point<AXES> = std::array::from_fn(|k| v[k] - s * e[k] - t * f[k]);
             return dot(&left, &left);
         }
     }
     [(a, b), (a, c), (b, c)].into_iter().map(|(a, b)| from_segment2(point, a, b)).fold(f64::INFINITY, f64::min)
 }
 
-fn from_segment2(point: &Point, a: &Point, b: &Point) -> f64 {
+fn from_segment2<const AXES: usize>(point: &Point<AXES>, a: &Point<AXES>, b: &Point<AXES>) -> f64 {
     let (along, v) = (minus(b, a), minus(point, a));
     let length2 = dot(&along, &along);
     let share = if length2 > 0.0 { (dot(&along, &v) / length2).clamp(0.0, 1.0) } else { 0.0 };
-    let left: Point = std::array::from_fn(|k| v[k] - share * along[k]);
+    let left: Point<AXES> = std::array::from_fn(|k| v[k] - share * along[k]);
     dot(&left, &left)
 }
 
@@ -91,7 +100,7 @@ mod tests {
     fn the_distance_from_a_triangle_is_that_of_its_nearest_point() {
         let part = |k: u32| f64::from(crate::noise::pcg4d([k, 3, 1, 4])[0] >> 8) / f64::from(1 << 24);
         for k in 0..50 {
-            let point = |n: u32| -> Point { std::array::from_fn(|axis| part(100 * k + 10 * n + axis as u32)) };
+            let point = |n: u32| -> Point<UNLIT> { std::array::from_fn(|axis| part(100 * k + 10 * n + axis as u32)) };
             let (p, corners) = (point(0), [point(1), point(2), point(3)]);
             let [a, b, c] = &corners;
             let found = distance2(&p, [a, b, c]).sqrt();
@@ -100,7 +109,7 @@ mod tests {
             for i in 0..=steps {
                 for j in 0..=steps - i {
                     let (s, t) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
-                    let left: Point = std::array::from_fn(|n| p[n] - a[n] - s * (b[n] - a[n]) - t * (c[n] - a[n]));
+                    let left: Point<UNLIT> = std::array::from_fn(|n| p[n] - a[n] - s * (b[n] - a[n]) - t * (c[n] - a[n]));
                     nearest = nearest.min(dot(&left, &left).sqrt());
                 }
             }

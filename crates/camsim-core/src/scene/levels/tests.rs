@@ -3,7 +3,7 @@
 use glam::{DQuat, EulerRot};
 
 use super::*;
-use crate::scene::MeshVertex;
+use crate::scene::{Encoding, MeshVertex, Texture};
 
 /// A sphere of 2 n^2 triangles, its picture around it, with a seam.
 fn globe(n: u32) -> Shape {
@@ -18,27 +18,25 @@ fn globe(n: u32) -> Shape {
     let vertices = (0..=n).flat_map(|j| (0..=n).map(move |i| at(i, j))).collect();
     let index = |i: u32, j: u32| j * (n + 1) + i;
     let cell = |i: u32, j: u32| [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j), index(i + 1, j + 1), index(i, j + 1)];
-    Shape { vertices, indices: (0..n).flat_map(|j| (0..n).flat_map(move |i| cell(i, j))).collect() }
+    Shape { vertices, indices: (0..n).flat_map(|j| (0..n).flat_map(move |i| cell(i, j))).collect(), normals: Vec::new() }
 }
 
 /// Distance of a point of one level from another level, by a look at every triangle.
-fn away_m(shape: &Shape, corners: &[u32], point: &space::Point) -> f64 {
-    let space = space::Space::of(shape);
+fn away_m<const AXES: usize>(points: &[space::Point<AXES>], corners: &[u32], point: &space::Point<AXES>) -> f64 {
     let of = |t: &[u32]| {
-        let [a, b, c] = [0, 1, 2].map(|k| space.point(&shape.vertices[t[k] as usize]));
-        space::distance2(point, [&a, &b, &c])
+        let [a, b, c] = [0, 1, 2].map(|k| &points[t[k] as usize]);
+        space::distance2(point, [a, b, c])
     };
     corners.chunks_exact(3).map(of).fold(f64::INFINITY, f64::min).sqrt()
 }
 
-#[test]
-fn every_point_of_a_level_is_within_its_error() {
-    let shape = globe(24);
-    let found = ShapeLevels::new(&shape);
+/// Looks at random points of every level.
+fn check_levels<const AXES: usize>(shape: &Shape) {
+    let found = ShapeLevels::new(shape);
     let counts: Vec<usize> = found.levels().iter().map(|level| level.indices.len() / 3).collect();
     assert!(counts.len() >= 4 && counts.windows(2).all(|pair| pair[1] < pair[0]), "{counts:?}");
     assert!(*counts.last().unwrap() < 100, "{counts:?}");
-    let space = space::Space::of(&shape);
+    let points = space::Space::of(shape).points::<AXES>(shape);
     for level in &found.levels()[1..] {
         let mut farthest = 0.0_f64;
         for (own, other) in [(&shape.indices, &level.indices), (&level.indices, &shape.indices)] {
@@ -46,14 +44,51 @@ fn every_point_of_a_level_is_within_its_error() {
                 let part = |n: u32| f64::from(crate::noise::pcg4d([k as u32, n, 5, 0])[0] >> 8) / f64::from(1 << 24);
                 let (a, b) = (part(0), part(1));
                 let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b, a + b - 1.0] } else { [a, b, 1.0 - a - b] };
-                let corners = [0, 1, 2].map(|c| space.point(&shape.vertices[t[c] as usize]));
+                let corners = [0, 1, 2].map(|c| points[t[c] as usize]);
                 let point = std::array::from_fn(|axis| (0..3).map(|c| weights[c] * corners[c][axis]).sum());
-                farthest = farthest.max(away_m(&shape, other, &point));
+                farthest = farthest.max(away_m(&points, other, &point));
             }
         }
         assert!(farthest <= level.error_m, "{farthest} {}", level.error_m);
         // The bound is not far from what is found at random.
         assert!(level.error_m < 3.0 * farthest, "{farthest} {}", level.error_m);
+    }
+}
+
+#[test]
+fn every_point_of_a_level_is_within_its_error() {
+    check_levels::<{ space::UNLIT }>(&globe(24));
+}
+
+/// A sphere with the normals of one.
+fn lit_globe(n: u32) -> Shape {
+    let mut shape = globe(n);
+    shape.normals = shape.vertices.iter().map(|vertex| vertex.position_m).collect();
+    shape
+}
+
+#[test]
+fn every_normal_of_a_level_is_within_its_error() {
+    check_levels::<{ space::LIT }>(&lit_globe(24));
+    // Where normals matter, fewer triangles are left out for the same error.
+    let (lit, unlit) = (ShapeLevels::new(&lit_globe(24)), ShapeLevels::new(&globe(24)));
+    let left = |levels: &ShapeLevels| levels.levels()[levels.within(0.6)].indices.len();
+    assert!(left(&lit) > left(&unlit), "{} {}", left(&lit), left(&unlit));
+}
+
+#[test]
+fn light_on_what_is_stretched_unevenly_leaves_no_level() {
+    let mut mesh =
+        Mesh::new(vec![], vec![], Arc::new(Texture::uniform([255; 4], Encoding::Linear)), DVec3::ZERO, crate::scene::Wrap::Clamp);
+    for (normals, uneven, expected) in [(false, true, 4.0), (true, false, 2.0), (true, true, f64::INFINITY)] {
+        mesh.shape = Arc::new(if normals { lit_globe(8) } else { globe(8) });
+        let scale = DVec3::new(2.0, if uneven { 4.0 } else { 2.0 }, 2.0);
+        mesh.ned_from_shape = DMat3::from_rotation_z(0.7) * DMat3::from_diagonal(scale);
+        let found = level_stretch(&mesh);
+        assert!(found == expected || (found - expected).abs() < 1e-12, "{found} {expected}");
+        if uneven && normals {
+            assert_eq!(ShapeLevels::new(&mesh.shape).within(5.0 / found), 0);
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod names;
 
+use camsim_core::scenario::LightSpec;
 use camsim_io::scenario_file::Kind;
 use eframe::egui::{self, Response, Role, Ui};
 use toml::Value;
@@ -89,14 +90,23 @@ fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: b
     };
     let edit =
         drag(ui, key, "", as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
-    if matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg") && remove(ui, key) {
+    let may_be_left_out = matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg") || key.starts_with("scene.light.");
+    if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, ongoing: false });
     }
     edit
 }
 
 fn first_value(param: &Param) -> f64 {
-    if param.key == "scene.fog_visibility_m" { 10_000.0 } else { 0.0_f64.clamp(param.range[0], param.range[1]) }
+    let light = LightSpec::default();
+    match param.key {
+        "scene.fog_visibility_m" => 10_000.0,
+        "scene.light.sun_azimuth_deg" => light.sun_azimuth_deg,
+        "scene.light.sun_elevation_deg" => light.sun_elevation_deg,
+        "scene.light.sun" => light.sun,
+        "scene.light.sky" => light.sky,
+        _ => 0.0_f64.clamp(param.range[0], param.range[1]),
+    }
 }
 
 fn remove(ui: &mut Ui, key: &str) -> bool {

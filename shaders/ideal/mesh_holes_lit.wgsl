@@ -1,0 +1,37 @@
+// Triangle meshes with holes, with light on them.
+#import ideal/holes.wgsl
+#import ideal/light.wgsl
+
+struct LitHoledSurface {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) uv: vec2<f32>,
+    @location(1) in_camera_m: vec3<f32>,
+    @location(2) tint: vec4<f32>,
+    // Where the sample is.
+    @location(3) @interpolate(perspective, sample) sample_uv: vec2<f32>,
+    @location(4) @interpolate(perspective, sample) sample_alpha: f32,
+    @location(5) normal_ned: vec3<f32>,
+}
+
+@vertex
+fn vertex(@builtin(instance_index) instance: u32, @location(0) position_m: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) tint: vec4<f32>, @location(3) normal: vec3<f32>) -> LitHoledSurface {
+    let surface = project_surface(base_from_shape(instance, position_m), uv);
+    return LitHoledSurface(surface.clip, surface.uv, surface.in_camera_m, tint, uv, tint.a, turned_normal(instance, normal));
+}
+
+@fragment
+fn fragment(in: LitHoledSurface, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
+    let color = mesh_color(in.uv, lit(in.tint, in.normal_ned, is_front), in.in_camera_m);
+    if (is_hole(in.sample_uv, in.sample_alpha)) {
+        discard;
+    }
+    return color;
+}
+
+// Where nothing but depth is drawn.
+@fragment
+fn fragment_depth(in: LitHoledSurface) {
+    if (is_hole(in.sample_uv, in.sample_alpha)) {
+        discard;
+    }
+}
