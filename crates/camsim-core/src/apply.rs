@@ -29,11 +29,14 @@ use crate::{
     },
 };
 
+mod flow;
 mod ideal;
 mod motion;
 pub mod paper;
 mod search;
 
+pub use flow::FlowField;
+use flow::FlowSearch;
 pub use ideal::{ApplyError, IdealFrame, Unseen, UnseenCounts};
 pub use motion::{Motion, PoseRow, PoseTrack, PoseTrackError};
 use search::DepthEdges;
@@ -52,6 +55,8 @@ const MAX_TAPS: u32 = 8;
 const EDGE_PARALLAX_PX: f64 = 0.1;
 /// A difference of inverse depth, relative to the nearer, that is a jump and no slope: as where depth is read.
 const JUMP: f64 = 0.1;
+/// Exposure nodes of a flow, which is straight but for its slopes: where these bend a path, every sample is solved on its own.
+const FLOW_NODES: u32 = 5;
 /// Miss of the polyline at the exposure's middle beyond which every sample is solved on its own, pixels.
 const BENT_PX: f64 = 0.05;
 
@@ -91,6 +96,7 @@ pub struct Pipeline<'a> {
     solver: Solver,
     twist: Twist,
     edges: DepthEdges,
+    flow: Option<FlowSearch<'a>>,
     /// Stored values, for the paper's preset only.
     stored_rgba: Vec<f32>,
     nodes: u32,
@@ -115,12 +121,22 @@ impl<'a> Pipeline<'a> {
         if solver == Solver::Oracle {
             return Err(ApplyError::Oracle);
         }
+        let flow = match motion {
+            Motion::Flow(flow) => {
+                frame.check_flow(flow)?;
+                if paper || solver != Solver::Reproject {
+                    return Err(ApplyError::Flow);
+                }
+                Some(FlowSearch::new(flow))
+            }
+            _ => None,
+        };
         let depth = InverseDepthImage { size_px: frame.geometry.size_px, values: &frame.inverse_depth };
         let edges = DepthEdges::new(&depth);
         let stored_rgba = if paper { frame.color_rgba.iter().map(|&v| srgb_from_linear(v.clamp(0.0, 1.0))).collect() } else { Vec::new() };
         let twist = motion.twist_at(frame.instant_s);
         let mut pipeline =
-            Self { spec, camera, shutter, frame, motion, settings: settings.clone(), solver, twist, edges, stored_rgba, nodes: 1 };
+            Self { spec, camera, shutter, frame, motion, settings: settings.clone(), solver, twist, edges, flow, stored_rgba, nodes: 1 };
         pipeline.nodes = pipeline.exposure_nodes();
         Ok(pipeline)
     }
@@ -144,6 +160,9 @@ impl<'a> Pipeline<'a> {
     fn source_of_ray(&self, uv: DVec2, dt_s: f64) -> Result<Source, Unseen> {
         let ideal = &self.frame.geometry;
         let holes = &self.frame.holes;
+        if let Some(flow) = &self.flow {
+            return flow.source(ideal.px_from_point(uv.extend(1.0)), self.flow_share(dt_s - self.frame.instant_s), &self.depth(), ideal);
+        }
         if self.solver == Solver::Reproject {
             return self.edges.source(uv, self.motion.key_from(dt_s, self.frame.instant_s), &self.depth(), holes, ideal);
         }
@@ -159,6 +178,11 @@ impl<'a> Pipeline<'a> {
         };
         let at_px = ideal.px_from_point(moved.extend(1.0));
         if at_px.is_finite() && ideal.contains(at_px) { Ok(Source { at_px, inverse_depth }) } else { Err(Unseen::Outside) }
+    }
+
+    /// The share of a flow's interval that a time is; 0 without a flow.
+    fn flow_share(&self, dt_s: f64) -> f64 {
+        if let Motion::Flow(flow) = self.motion { dt_s / flow.interval_s } else { 0.0 }
     }
 
     /// The paper's models take the depth where the ray would look if nothing moved: the nearest texel in its own preset, bilinear else.
@@ -266,6 +290,10 @@ impl<'a> Pipeline<'a> {
         if chord_px.distance(middle_px) > BENT_PX {
             return true;
         }
+        if let Some(flow) = &self.flow {
+            let share = self.flow_share(self.shutter.exposure_s());
+            return flow.parts(sources.iter().map(|source| source.at_px), share, EDGE_PARALLAX_PX);
+        }
         let half_s = 0.5 * self.shutter.exposure_s();
         let (_, begin) = self.motion.key_from(dt_s - half_s, self.frame.instant_s);
         let (_, end) = self.motion.key_from(dt_s + half_s, self.frame.instant_s);
@@ -282,14 +310,21 @@ impl<'a> Pipeline<'a> {
     /// Change of the source per output pixel: through the lens's inverse Jacobian and the relative pose at the ray's own depth.
     fn footprint(&self, uv: DVec2, dt_s: f64, source: &Source) -> Footprint {
         let uv_from_px = self.camera.lens.jacobian(uv).inverse();
+        let focal = self.camera.focal_px;
+        let pixel = [DVec2::new(1.0 / focal.x, 0.0), DVec2::new(0.0, 1.0 / focal.y)];
+        if let Some(flow) = &self.flow {
+            let source_from_look = flow.source_from_look(source.at_px, self.flow_share(dt_s - self.frame.instant_s));
+            let [dx, dy] = pixel.map(|d| source_from_look * (self.frame.geometry.focal_px * (uv_from_px * d)));
+            return Footprint::new(dx, dy, TapStage::Grid { most: MAX_TAPS });
+        }
         let (rotation, shift) = self.motion.key_from(dt_s, self.frame.instant_s);
         let p = rotation * uv.extend(1.0) + source.inverse_depth * shift;
         let step = |d: DVec2| {
             let moved = rotation * (uv_from_px * d).extend(0.0);
             self.frame.geometry.focal_px * (moved.truncate() - p.truncate() * (moved.z / p.z)) / p.z
         };
-        let focal = self.camera.focal_px;
-        Footprint::new(step(DVec2::new(1.0 / focal.x, 0.0)), step(DVec2::new(0.0, 1.0 / focal.y)), TapStage::Grid { most: MAX_TAPS })
+        let [dx, dy] = pixel.map(step);
+        Footprint::new(dx, dy, TapStage::Grid { most: MAX_TAPS })
     }
 
     /// Nodes so that no chord misses the path by more than [`CHORD_MISS_PX`], seen at a grid of pixels. The miss falls with the square of
@@ -298,6 +333,9 @@ impl<'a> Pipeline<'a> {
         let exposure_s = self.shutter.exposure_s();
         if exposure_s <= 0.0 {
             return 1;
+        }
+        if self.flow.is_some() {
+            return FLOW_NODES;
         }
         let steps = self.motion.instants(exposure_s);
         let [width, height] = self.camera.size_px;

@@ -20,6 +20,10 @@
 //! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera),
 //! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw without a header
 //! # stamp_s = 12.5                   #     and the stamp on their clock
+//! # flow = "flow.flo"              # ... or where each pixel goes, whatever moves it: Middlebury .flo, or an EXR
+//! # flow_channels = ["X", "Y"]     #     of an EXR with more than two: right and down
+//! # flow_scale = [1.0, 1.0]        #     times this are pixels; [1.0, -1.0] where y is up
+//! # flow_interval_ms = 33.3        #     after how long; negative: where it was so long before
 //! # [fog]                            # preset "paper" only: linear fog, added after the blur
 //! # end_m = 12000.0
 //! # color = [0.5, 0.6, 0.7]          # stored values
@@ -50,6 +54,7 @@ use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
 mod depth;
 mod exr_planes;
+mod flow;
 mod images;
 pub mod list;
 mod poses;
@@ -142,6 +147,10 @@ struct MotionSpec {
     #[serde(default)]
     trajectory_format: TrajectoryFormat,
     stamp_s: Option<f64>,
+    flow: Option<PathBuf>,
+    flow_channels: Option<Vec<String>>,
+    flow_scale: Option<[f64; 2]>,
+    flow_interval_ms: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]

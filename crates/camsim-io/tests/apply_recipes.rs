@@ -31,7 +31,17 @@ fn stub(folder: &Path, key: &str, name: &str, has_unit: bool) {
     match (key, path.extension().unwrap().to_str().unwrap()) {
         ("color", "exr") => write_exr(
             &path,
-            &["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B", "ViewLayer.Depth.Z", "ViewLayer.Mist.Z"],
+            &[
+                "ViewLayer.Combined.R",
+                "ViewLayer.Combined.G",
+                "ViewLayer.Combined.B",
+                "ViewLayer.Depth.Z",
+                "ViewLayer.Mist.Z",
+                "ViewLayer.Vector.X",
+                "ViewLayer.Vector.Y",
+                "ViewLayer.Vector.Z",
+                "ViewLayer.Vector.W",
+            ],
         ),
         // The colour's own file has it already.
         ("depth", "exr") if path.is_file() => {}

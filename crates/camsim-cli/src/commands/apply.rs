@@ -49,6 +49,9 @@ FRAME.toml (paths relative to it):
   angular_rate_rad_s = [0.0, 0.0, 0.628]
   trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera), and stamp_s;
                                trajectory_format = \"tum\": t x y z qx qy qz qw without a header
+  flow = \"flow.flo\"            ... or where each pixel goes in flow_interval_ms, camera and things together: Middlebury .flo, or an EXR
+                               of two channels (of more: flow_channels = [\"X\", \"Y\"], right and down); flow_scale = [1, -1]
+                               where y is up
   [fog]                        end_m, color: with --preset paper only
 
 Many frames, in place of color, depth and stamp_s:
@@ -217,6 +220,7 @@ fn in_file(args: &Args, error: &ApplyError) -> anyhow::Error {
     let file = match error {
         ApplyError::Camera(_) | ApplyError::Shutter(_) => &args.camera,
         ApplyError::Frame { .. } | ApplyError::Motion(_) | ApplyError::Fog => &args.frame,
+        ApplyError::Flow => return anyhow!("{error}"),
         ApplyError::Oracle => return anyhow!("--solver: {error}"),
     };
     anyhow!("{}: {error}", file.display())

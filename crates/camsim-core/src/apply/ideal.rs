@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::PoseTrackError;
+use super::{FlowField, PoseTrackError};
 use crate::{camera::CameraError, shutter::ShutterError, temporal::IdealGeometry};
 
 /// Why the pipeline cannot run.
@@ -25,6 +25,11 @@ pub enum ApplyError {
     /// The motion.
     #[error(transparent)]
     Motion(#[from] PoseTrackError),
+    /// Methods that a flow leaves nothing to do.
+    #[error(
+        "a flow says where everything goes, which the paper's methods and solvers cannot use: leave --preset and --solver out, or the flow"
+    )]
+    Flow,
     /// A solver that needs a scene.
     #[error("solver \"oracle\" casts rays into a scene, and an ideal frame is none: use \"reproject\" (exact up to what the frame shows)")]
     Oracle,
@@ -89,6 +94,19 @@ impl UnseenCounts {
 }
 
 impl IdealFrame {
+    /// A flow for each pixel, over some time.
+    pub(super) fn check_flow(&self, flow: &FlowField) -> Result<(), ApplyError> {
+        let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });
+        let [[width, height], [w, h]] = [self.geometry.size_px, flow.size_px];
+        if [width, height] != [w, h] || flow.px.len() != w as usize * h as usize {
+            return frame(format!("a flow of {w}x{h} pixels beside a picture of {width}x{height}"), "flow and colour must have one size");
+        }
+        if !(flow.interval_s.is_finite() && flow.interval_s != 0.0) {
+            return frame(format!("a flow over {} s", flow.interval_s), "give the time between the two instants that it joins");
+        }
+        Ok(())
+    }
+
     /// Planes that fill the geometry, and finite values.
     pub(super) fn check(&self) -> Result<(), ApplyError> {
         let frame = |what: String, fix| Err(ApplyError::Frame { what, fix });

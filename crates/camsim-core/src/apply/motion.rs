@@ -1,7 +1,8 @@
-//! The camera's motion about the stamp: a constant twist, or a table of poses.
+//! The motion about the stamp: a constant twist of the camera, a table of its poses, or a flow.
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::FlowField;
 use crate::{
     temporal::displacement::Twist,
     trajectory::so3::{exp, left_jacobian_times, log},
@@ -20,10 +21,12 @@ pub enum Motion {
     Twist(Twist),
     /// Poses over time.
     Poses(PoseTrack),
+    /// Where each pixel of the ideal frame goes, whatever moves it.
+    Flow(FlowField),
 }
 
 impl Motion {
-    /// `x_key = R x_line + t`, from the camera at `dt_s` to the camera at `instant_s`.
+    /// `x_key = R x_line + t` (of a flow, in which the camera's part is not known apart, as if it stood still), from the camera at `dt_s` to the camera at `instant_s`.
     #[must_use]
     pub fn key_from(&self, dt_s: f64, instant_s: f64) -> (DMat3, DVec3) {
         match self {
@@ -37,6 +40,7 @@ impl Motion {
                 let camera_from_world = key.1.inverse();
                 (DMat3::from_quat((camera_from_world * line.1).normalize()), camera_from_world * (line.0 - key.0))
             }
+            Self::Flow(_) => (DMat3::IDENTITY, DVec3::ZERO),
         }
     }
 
@@ -46,15 +50,17 @@ impl Motion {
         match self {
             Self::Twist(twist) => *twist,
             Self::Poses(track) => track.twist_at(instant_s),
+            Self::Flow(_) => Twist::default(),
         }
     }
 
-    /// Whether the camera may change its place, so that depth matters; of a table that is taken for granted.
+    /// Whether the camera may change its place, so that depth matters; of a table that is taken for granted. A flow says it all without.
     #[must_use]
     pub fn translates(&self) -> bool {
         match self {
             Self::Twist(twist) => twist.velocity_m_s != DVec3::ZERO,
             Self::Poses(_) => true,
+            Self::Flow(_) => false,
         }
     }
 
@@ -64,7 +70,7 @@ impl Motion {
     /// A table of poses that begins later or ends earlier.
     pub fn covers(&self, first_s: f64, last_s: f64) -> Result<(), PoseTrackError> {
         match self {
-            Self::Twist(_) => Ok(()),
+            Self::Twist(_) | Self::Flow(_) => Ok(()),
             Self::Poses(track) => track.covers(first_s, last_s),
         }
     }
@@ -82,7 +88,7 @@ impl Motion {
     #[must_use]
     pub fn instants(&self, exposure_s: f64) -> u32 {
         match self {
-            Self::Twist(_) => INSTANTS,
+            Self::Twist(_) | Self::Flow(_) => INSTANTS,
             Self::Poses(track) => INSTANTS.max((4.0 * exposure_s / track.mean_step_s()).min(4096.0) as u32),
         }
     }

@@ -7,6 +7,8 @@ use crate::lens::LensModel;
 use crate::scenario::{FieldOr, LensSpec, ShutterSpec};
 use crate::temporal::IdealGeometry;
 
+mod flow;
+
 /// A frame whose pixels show the surface that `look` gives for a ray (u, v, 1): inverse depth and linear colour.
 fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3])) -> IdealFrame {
     let geometry = IdealGeometry {

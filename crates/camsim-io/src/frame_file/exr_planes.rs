@@ -53,6 +53,16 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
 }
 
 impl Planes {
+    /// The only two planes of a file.
+    pub(super) fn pair(&self) -> Result<[&Plane; 2], String> {
+        match &self.planes[..] {
+            // Channels are sorted by name: X before Y, U before V, but R after G.
+            [a, b] if a.name.ends_with('G') && b.name.ends_with('R') => Ok([whole(b)?, whole(a)?]),
+            [a, b] => Ok([whole(a)?, whole(b)?]),
+            _ => Err(format!("has the channels {}: say with motion.flow_channels which two are the flow right and down", self.list())),
+        }
+    }
+
     /// All names, for messages.
     fn list(&self) -> String {
         self.planes.iter().map(|plane| plane.name.as_str()).collect::<Vec<_>>().join(" ")

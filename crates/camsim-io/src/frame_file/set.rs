@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::{
     FrameFile, FrameFileError, FrameSpec,
+    flow::read_flow,
     list::{Entry, frames},
     poses::read_poses,
     read_pictures, read_spec,
@@ -29,6 +30,7 @@ pub struct FrameSet {
 #[derive(Clone, Debug)]
 enum Moves {
     Twist(Twist),
+    Flow(PathBuf),
     /// Rows with times from `base_s`.
     Poses {
         table: PathBuf,
@@ -80,6 +82,7 @@ impl FrameSet {
     pub fn motion(&self, index: usize) -> Result<Motion, FrameFileError> {
         match &self.moves {
             Moves::Twist(twist) => Ok(Motion::Twist(*twist)),
+            Moves::Flow(flow) => Ok(Motion::Flow(read_flow(flow, &self.spec.motion)?)),
             Moves::Poses { table, rows, base_s } => {
                 let stamp_s = self.stamp_s(index).unwrap_or(*base_s);
                 let track = PoseTrack::new(rows.clone(), stamp_s - base_s);
@@ -115,6 +118,18 @@ fn seconds(stamp_ns: i64) -> f64 {
 fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path) -> Result<Moves, FrameFileError> {
     let motion = &spec.motion;
     let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    if let Some(flow) = &motion.flow {
+        check_flow(spec, several, path)?;
+        return Ok(Moves::Flow(flow.clone()));
+    }
+    let of_flow = [
+        ("motion.flow_channels", motion.flow_channels.is_some()),
+        ("motion.flow_scale", motion.flow_scale.is_some()),
+        ("motion.flow_interval_ms", motion.flow_interval_ms.is_some()),
+    ];
+    if let Some((key, _)) = of_flow.into_iter().find(|(_, given)| *given) {
+        return fail(key, "is for motion.flow, which is missing; add it, or leave this out");
+    }
     let Some(trajectory) = &motion.trajectory else {
         if motion.stamp_s.is_some() && spec.fps.is_none() {
             return fail("motion.stamp_s", "is the stamp on the clock of motion.trajectory, which is missing; add it, or leave this out");
@@ -148,4 +163,31 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path) -
     let rows = read_poses(trajectory, motion.trajectory_format, base_s)?;
     let moves = Moves::Poses { table: trajectory.clone(), rows, base_s };
     Ok(moves)
+}
+
+/// A flow goes with nothing else that moves, over a time that is not 0.
+fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameFileError> {
+    let motion = &spec.motion;
+    let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
+    let others = motion.velocity_m_s.is_some() || motion.angular_rate_rad_s.is_some() || motion.trajectory.is_some();
+    if others || motion.stamp_s.is_some() {
+        return fail("motion.flow", "says where everything goes, the camera's part included; leave twist, trajectory and stamp_s out");
+    }
+    if several {
+        return fail("motion.flow", "is of one frame: give each frame a FRAME.toml of its own");
+    }
+    if motion.flow_channels.as_ref().is_some_and(|names| names.len() != 2) {
+        return fail("motion.flow_channels", "must be two names: the flow to the right, and down");
+    }
+    if motion.flow_scale.is_some_and(|scale| !scale.iter().all(|part| part.is_finite() && *part != 0.0)) {
+        return fail("motion.flow_scale", "must be two finite numbers that are not 0; [1, -1] where y is up");
+    }
+    match motion.flow_interval_ms {
+        Some(ms) if ms.is_finite() && ms != 0.0 => Ok(()),
+        Some(_) => fail("motion.flow_interval_ms", "must be the time between the two instants that the flow joins, not 0"),
+        None => fail(
+            "motion.flow_interval_ms",
+            "is missing: give the time between the two instants that the flow joins, 1000 / fps for successive frames",
+        ),
+    }
 }

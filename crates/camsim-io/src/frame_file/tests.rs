@@ -178,3 +178,66 @@ fn packed_depth_must_be_lossless() {
     fs::write(&path, fs::read_to_string(&path).unwrap().replace("p.png", "p.bmp")).unwrap();
     assert!((f64::from(read_frame(&path).unwrap().frame.inverse_depth[0]) * 2.2 - 1.0).abs() < 1e-6);
 }
+
+/// A .flo file of 3x2 pixels: 1 to the right, and down by the pixel's number; the last is not known.
+fn flo() -> Vec<u8> {
+    let numbers = (0..6).flat_map(|k| if k == 5 { [1.6e9_f32, 1.6e9] } else { [1.0, k as f32] });
+    let head = [202_021.25_f32.to_le_bytes(), 3_u32.to_le_bytes(), 2_u32.to_le_bytes()].concat();
+    head.into_iter().chain(numbers.flat_map(f32::to_le_bytes)).collect()
+}
+
+fn read_with_flow(text: &str, flow: &[u8]) -> Result<FrameFile, FrameFileError> {
+    let (folder, path) = folder(&format!("{GOOD}[motion]\n{text}\n"));
+    fs::write(folder.path().join("f.flo"), flow).unwrap();
+    let planes = |names: &[&str]| {
+        use exr::prelude::*;
+        let list = names
+            .iter()
+            .enumerate()
+            .map(|(n, name)| AnyChannel::new(*name, FlatSamples::F32((0..6).map(|k| (10 * n + k) as f32).collect())));
+        AnyChannels::sort(list.collect())
+    };
+    for (name, channels) in [("two.exr", planes(&["X", "Y"])), ("four.exr", planes(&["Vector.X", "Vector.Y", "Vector.Z", "Vector.W"]))] {
+        exr::prelude::WritableImage::write(&exr::prelude::Image::from_channels((3, 2), channels))
+            .to_file(folder.path().join(name))
+            .unwrap();
+    }
+    read_frame(&path)
+}
+
+#[test]
+fn flows_are_read_from_flo_and_exr() {
+    let flow = |text: &str| match read_with_flow(text, &flo()).unwrap().motion {
+        Motion::Flow(flow) => flow,
+        other => panic!("{other:?}"),
+    };
+    let found = flow("flow = \"f.flo\"\nflow_interval_ms = 40");
+    assert_eq!((found.size_px, found.interval_s), ([3, 2], 0.04));
+    assert_eq!(found.px[..5], [[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [1.0, 3.0], [1.0, 4.0]]);
+    assert!(found.px[5][0].is_nan() && found.px[5][1].is_nan());
+    let found = flow("flow = \"two.exr\"\nflow_interval_ms = -40\nflow_scale = [2, -1]");
+    assert_eq!((found.px[1], found.px[5], found.interval_s), ([2.0, -11.0], [10.0, -15.0], -0.04));
+    let found = flow("flow = \"four.exr\"\nflow_channels = [\"Z\", \"Vector.W\"]\nflow_interval_ms = 40");
+    assert_eq!(found.px[2], [22.0, 32.0]);
+}
+
+#[test]
+fn flows_that_cannot_be_used_are_named() {
+    for (text, bytes, wanted) in [
+        ("flow = \"f.flo\"", flo(), "motion.flow_interval_ms: is missing"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 0", flo(), "not 0"),
+        ("flow_interval_ms = 3", flo(), "is for motion.flow, which is missing"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3\nvelocity_m_s = [1, 0, 0]", flo(), "leave twist, trajectory and stamp_s out"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_scale = [1, 0]", flo(), "motion.flow_scale"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_channels = [\"X\"]", flo(), "two names"),
+        ("flow = \"no.flo\"\nflow_interval_ms = 3", flo(), "no.flo: cannot be read"),
+        ("flow = \"c.png\"\nflow_interval_ms = 3", flo(), "c.png: is no Middlebury .flo file"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3", flo()[..40].to_vec(), "f.flo: says 3x2 pixels and holds 7 numbers"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3", [&flo()[..12], &[0xff; 48]].concat(), "no pixel whose flow is known"),
+        ("flow = \"four.exr\"\nflow_interval_ms = 3", flo(), "motion.flow_channels which two"),
+        ("flow = \"four.exr\"\nflow_interval_ms = 3\nflow_channels = [\"X\", \"Q\"]", flo(), "has no channel Q"),
+    ] {
+        let error = read_with_flow(text, &bytes).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{text}: {error}");
+    }
+}

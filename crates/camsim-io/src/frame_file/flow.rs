@@ -1,0 +1,59 @@
+//! Optical flow: Middlebury `.flo`, or two channels of an EXR.
+
+use std::path::Path;
+
+use camsim_core::apply::FlowField;
+
+use super::{
+    FrameFileError, MotionSpec,
+    exr_planes::read_exr,
+    images::{failure, is_exr},
+};
+
+/// The first four bytes of a `.flo` file are this number, little-endian.
+const FLO_TAG: f32 = 202_021.25;
+/// Middlebury's: what is larger is not known.
+const UNKNOWN_PX: f32 = 1e9;
+
+/// Reads `motion.flow`; its keys have been checked.
+pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<FlowField, FrameFileError> {
+    let (size_px, values) = if is_exr(path) { read_exr_flow(path, motion)? } else { read_flo(path)? };
+    let scale = motion.flow_scale.unwrap_or([1.0; 2]);
+    let known = |[u, v]: [f32; 2]| u.abs() <= UNKNOWN_PX && v.abs() <= UNKNOWN_PX;
+    let scaled = |uv: [f32; 2]| if known(uv) { [0, 1].map(|k: usize| uv[k] * scale[k] as f32) } else { [f32::NAN; 2] };
+    let px: Vec<[f32; 2]> = values.into_iter().map(scaled).collect();
+    if px.iter().all(|uv| uv[0].is_nan()) {
+        return Err(failure(path, "has no pixel whose flow is known: values are pixels, and more than 1e9 is none"));
+    }
+    Ok(FlowField { size_px, px, interval_s: 1e-3 * motion.flow_interval_ms.unwrap_or_default() })
+}
+
+fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
+    let picture = read_exr(path)?;
+    let wrong = |message: String| failure(path, message);
+    let [u, v] = match motion.flow_channels.as_deref() {
+        Some([u, v]) => [picture.named(u).map_err(wrong)?, picture.named(v).map_err(wrong)?],
+        _ => picture.pair().map_err(wrong)?,
+    };
+    if u.size_px != v.size_px || u.origin_px != v.origin_px {
+        return Err(failure(path, format!("has flow channels of different sizes or places: {} {}", u.name, v.name)));
+    }
+    Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect()))
+}
+
+fn read_flo(path: &Path) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
+    let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
+    let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
+    if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
+        return Err(failure(path, "is no Middlebury .flo file (they begin with PIEH), and no EXR by its name: a flow is one of the two"));
+    }
+    let side = |word: Option<[u8; 4]>| word.map_or(0, u32::from_le_bytes);
+    let size_px = [side(words.next()), side(words.next())];
+    let values: Vec<f32> = words.map(f32::from_le_bytes).collect();
+    let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
+    if pixels == 0 || 2 * pixels != values.len() as u64 || bytes.len() % 4 != 0 {
+        let [width, height] = size_px;
+        return Err(failure(path, format!("says {width}x{height} pixels and holds {} numbers: it is cut off or damaged", values.len())));
+    }
+    Ok((size_px, values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()))
+}
