@@ -79,7 +79,7 @@ impl Motion {
     #[must_use]
     pub fn longest_step_s(&self, first_s: f64, last_s: f64) -> f64 {
         match self {
-            Self::Twist(_) => 0.0,
+            Self::Twist(_) | Self::Flow(_) => 0.0,
             Self::Poses(track) => track.longest_step_s(first_s, last_s),
         }
     }
