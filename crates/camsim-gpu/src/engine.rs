@@ -97,9 +97,10 @@ impl Engine {
     }
 
     /// How many pixels of a line each thread takes, for frames of sessions to come: many for a software adapter (the default there), one for a GPU,
-    /// which wants threads. Pictures are the same, byte for byte.
+    /// which wants threads; 1 to 4096. Pictures are the same, byte for byte.
     pub fn set_pixels_a_thread(&mut self, pixels: u32) {
-        self.gpu.pixels_a_thread = pixels.max(1);
+        // A line has no more of them; products with a workgroup's side stay far from overflow.
+        self.gpu.pixels_a_thread = pixels.clamp(1, 4096);
     }
 
     /// Most pixels of an output frame with depth and coordinates.
