@@ -80,7 +80,7 @@ impl fmt::Display for AdapterSummary {
     }
 }
 
-/// Pixels that a thread takes on a software adapter: on llvmpipe reading a line's poses costs as much as the rest of a pixel, and there are few processors
+/// Pixels that a thread takes on a software adapter: reading a line's poses costs llvmpipe up to two fifths of the kernel, and there are few processors
 /// to be kept busy (docs/PERFORMANCE.md).
 const SOFTWARE_PIXELS: u32 = 16;
 

@@ -1,5 +1,5 @@
-// Poses of a line, read once for all of the pixels that a thread takes along it: llvmpipe reads a buffer lane by lane, a quarter of a kernel's time if
-// each pixel did.
+// Poses of a line, read once for all of the pixels that a thread takes along it: llvmpipe reads a buffer lane by lane, and where each pixel did so it took
+// up to two fifths of the kernel (docs/PERFORMANCE.md, "Reads of buffers").
 var<private> held: array<Pose, STEPS + 1u>;
 var<private> held_mid: Pose;
 
