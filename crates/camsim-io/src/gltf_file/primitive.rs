@@ -84,16 +84,7 @@ impl Making<'_> {
     /// The file's own normals, of any length.
     fn given_normals(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Option<Vec<DVec3>>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };
-        let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
-        let mut normals: Vec<DVec3> = accessor::rows(self.source, &accessor)?.into_iter().map(vector).collect();
-        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
-            let Some(accessor) = target.normals() else { continue };
-            let shifts = accessor::rows(self.source, &accessor)?;
-            if shifts.len() != normals.len() {
-                return Err(self.wrong(primitive, "a morph target has another number of elements"));
-            }
-            normals.iter_mut().zip(shifts).for_each(|(normal, shift)| *normal += weight * vector(shift));
-        }
+        let mut normals = self.morphed(primitive, &accessor, |target| target.normals())?;
         if normals.len() != count {
             return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
         }
@@ -106,22 +97,33 @@ impl Making<'_> {
         Ok(Some(normals))
     }
 
+    /// Vectors, each with what the morph targets add to it.
+    fn morphed<'a>(
+        &self,
+        primitive: &gltf::Primitive<'a>,
+        accessor: &gltf::Accessor<'_>,
+        of: impl Fn(&gltf::mesh::MorphTarget<'a>) -> Option<gltf::Accessor<'a>>,
+    ) -> Result<Vec<DVec3>, GltfError> {
+        let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
+        let mut vectors: Vec<DVec3> = accessor::rows(self.source, accessor)?.into_iter().map(vector).collect();
+        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
+            let Some(accessor) = of(&target) else { continue };
+            let shifts = accessor::rows(self.source, &accessor)?;
+            if shifts.len() != vectors.len() {
+                return Err(self.wrong(primitive, "a morph target has another number of elements"));
+            }
+            vectors.iter_mut().zip(shifts).for_each(|(sum, shift)| *sum += weight * vector(shift));
+        }
+        Ok(vectors)
+    }
+
     fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
         self.source.broken(format!("a mesh's primitive {}: {message}", primitive.index()))
     }
 
     fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Positions) else { return Ok(Vec::new()) };
-        let vector = |[x, y, z, _]: [f64; 4]| DVec3::new(x, y, z);
-        let mut positions: Vec<DVec3> = accessor::rows(self.source, &accessor)?.into_iter().map(vector).collect();
-        for (target, &weight) in primitive.morph_targets().zip(self.weights).filter(|(_, weight)| **weight != 0.0) {
-            let Some(accessor) = target.positions() else { continue };
-            let shifts = accessor::rows(self.source, &accessor)?;
-            if shifts.len() != positions.len() {
-                return Err(self.wrong(primitive, "a morph target has another number of elements"));
-            }
-            positions.iter_mut().zip(shifts).for_each(|(position, shift)| *position += weight * vector(shift));
-        }
+        let mut positions = self.morphed(primitive, &accessor, |target| target.positions())?;
         if let Some(joints) = self.joints {
             self.bend(primitive, joints, &mut positions)?;
         }
