@@ -18,12 +18,12 @@ pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
 pub use light::Light;
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
-pub use picture_tiles::{TILE_BYTES, TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole};
+pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
 pub use terrain::{
     Aabb, CHUNK_CELLS, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid, TerrainHit,
     TerrainMesh, TerrainVertex, VERTEX_BITS,
 };
-pub use texture::{Encoding, MipLevel, Texture, Wrap, linear_from_srgb, srgb_from_linear};
+pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
 
 /// What there is to see.
 #[derive(Clone, Debug, Default)]

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use camsim_core::scene::TexelForm;
+
 /// Errors of the GPU side. Texts name the fix.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
@@ -97,6 +99,8 @@ pub struct GpuContext {
     pub(crate) max_picture_px: u32,
     /// Pixels of a line that a thread of the reverse kernel takes.
     pub(crate) pixels_a_thread: u32,
+    /// How pictures are held.
+    pub(crate) texels: TexelForm,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -162,11 +166,11 @@ impl GpuContext {
         let (device, queue) =
             pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
-        let pixels_a_thread = match info.device_type {
-            wgpu::DeviceType::Cpu => SOFTWARE_PIXELS,
-            _ => 1,
+        let (pixels_a_thread, texels) = match info.device_type {
+            wgpu::DeviceType::Cpu => (SOFTWARE_PIXELS, TexelForm::Light),
+            _ => (1, TexelForm::Stored),
         };
-        Ok(Self { device, queue, adapter: summary, max_picture_px, pixels_a_thread })
+        Ok(Self { device, queue, adapter: summary, max_picture_px, pixels_a_thread, texels })
     }
 
     /// Largest side of a texture.

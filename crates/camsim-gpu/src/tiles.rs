@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
-use camsim_core::scene::{Encoding, GroundTiles, TILE_BYTES, TILE_SIDE, Terrain, TileSource};
+use camsim_core::scene::{GroundTiles, TILE_SIDE, Terrain, TexelForm, TileSource, tile_bytes};
 
 use crate::{
     context::{GpuContext, GpuError},
     recorder::Recorder,
+    upload::texture_format,
 };
 
 /// Tiles along a side of a layer of the texture that holds them, as in shaders/ideal/picture/tiles.wgsl.
@@ -44,9 +45,9 @@ struct Layers {
 impl TilePool {
     /// For the ground's picture. Nothing is on the device yet.
     #[must_use]
-    pub fn new(terrain: &Terrain) -> Self {
+    pub fn new(terrain: &Terrain, form: TexelForm) -> Self {
         let ground = Arc::new(GroundTiles::new(terrain));
-        let source = TileSource::new(&terrain.texture);
+        let source = TileSource::new(&terrain.texture, form);
         let place_of = vec![None; source.grid.count as usize];
         Self { ground, source, layers: None, place_of, at_place: Vec::new(), frames: 0, changes: [0; 2], table: Vec::new() }
     }
@@ -69,7 +70,7 @@ impl TilePool {
     /// Tiles on the device, and what their layers take, bytes.
     #[must_use]
     pub fn held(&self) -> (usize, u64) {
-        (self.place_of.iter().flatten().count(), self.at_place.len() as u64 * TILE_BYTES)
+        (self.place_of.iter().flatten().count(), self.at_place.len() as u64 * tile_bytes(self.source.form()))
     }
 
     /// Makes sure that a frame finds its tiles. Frames that have been submitted have read theirs before these are written.
@@ -119,7 +120,7 @@ impl TilePool {
             return Err(GpuError::TooLarge {
                 what: format!(
                     "what one frame reads of scene.terrain.ortho ({} MiB in {tiles} tiles, in layers of {TILES_A_LAYER})",
-                    (u64::from(tiles) * TILE_BYTES) >> 20
+                    (u64::from(tiles) * tile_bytes(self.source.form())) >> 20
                 ),
                 needed: needed.into(),
                 limit_name: "max_texture_array_layers",
@@ -132,10 +133,6 @@ impl TilePool {
         self.layers = None;
         self.place_of.fill(None);
         self.at_place = vec![None; (count * TILES_A_LAYER) as usize];
-        let format = match self.source.encoding() {
-            Encoding::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
-            Encoding::Linear => wgpu::TextureFormat::Rgba8Unorm,
-        };
         let side = TILES_A_SIDE * TILE_SIDE;
         let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("camsim.surface.tiles"),
@@ -143,7 +140,7 @@ impl TilePool {
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format,
+            format: texture_format(self.source.encoding(), self.source.form()),
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
@@ -163,7 +160,11 @@ impl TilePool {
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo { texture: &layers.texture, mip_level: 0, origin, aspect: wgpu::TextureAspect::All },
             &self.source.texels(tile),
-            wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * TILE_SIDE), rows_per_image: None },
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(self.source.form().bytes() as u32 * TILE_SIDE),
+                rows_per_image: None,
+            },
             wgpu::Extent3d { width: TILE_SIDE, height: TILE_SIDE, depth_or_array_layers: 1 },
         );
     }

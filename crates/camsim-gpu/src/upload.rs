@@ -3,7 +3,7 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::scene::{
-    Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, Texture, Wrap, is_whole, levels::level_stretch,
+    Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole, levels::level_stretch,
 };
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
@@ -162,7 +162,7 @@ fn create_sampler(gpu: &GpuContext, wrap: [Wrap; 2], nearest: bool) -> wgpu::Sam
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
     let picture = match is_whole(terrain.texture.size_px, gpu.max_picture_px) {
         true => GroundPicture::Whole(upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?),
-        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain))),
+        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain, gpu.texels))),
     };
     Ok(TerrainBuffers { picture })
 }
@@ -235,6 +235,15 @@ fn upload_batch(
     }
 }
 
+/// Of a picture on the device.
+pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::TextureFormat {
+    match (form, encoding) {
+        (TexelForm::Light, _) => wgpu::TextureFormat::Rgba16Float,
+        (TexelForm::Stored, Encoding::Srgb) => wgpu::TextureFormat::Rgba8UnormSrgb,
+        (TexelForm::Stored, Encoding::Linear) => wgpu::TextureFormat::Rgba8Unorm,
+    }
+}
+
 fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgpu::TextureView, GpuError> {
     let [width, height] = texture.size_px;
     if width.max(height) > gpu.max_side_px() {
@@ -246,13 +255,9 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgp
             fix: "reduce the picture",
         });
     }
-    let mips = texture.mips();
-    let format = match texture.encoding {
-        Encoding::Srgb => wgpu::TextureFormat::Rgba8UnormSrgb,
-        Encoding::Linear => wgpu::TextureFormat::Rgba8Unorm,
-    };
-    let mut data = texture.rgba8.clone();
-    mips.iter().for_each(|mip| data.extend_from_slice(&mip.rgba8));
+    let mips = texture.mips(gpu.texels);
+    let mut data = texture.texels(&texture.rgba8, gpu.texels).into_owned();
+    mips.iter().for_each(|mip| data.extend_from_slice(&mip.texels));
     let on_device = gpu.device.create_texture_with_data(
         &gpu.queue,
         &wgpu::TextureDescriptor {
@@ -261,7 +266,7 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgp
             mip_level_count: mips.len() as u32 + 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format,
+            format: texture_format(texture.encoding, gpu.texels),
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         },

@@ -3,7 +3,7 @@
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, Solver},
-    scene::{self, GroundTiles, ModelDetail, SceneLevels, TILE_BYTES, TerrainDetail},
+    scene::{self, GroundTiles, ModelDetail, SceneLevels, TerrainDetail, TexelForm, tile_bytes},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
@@ -206,7 +206,12 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let ground = GroundTiles::new(terrain);
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
     let all = u64::from(ground.grid.count);
-    Some(Memory { heights_on_host, picture_on_host: 4 * picture / 3, picture_on_device: tiles * TILE_BYTES, tiles: Some([tiles, all]) })
+    Some(Memory {
+        heights_on_host,
+        picture_on_host: 4 * picture / 3,
+        picture_on_device: tiles * tile_bytes(TexelForm::Stored),
+        tiles: Some([tiles, all]),
+    })
 }
 
 fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -215,9 +220,9 @@ fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>)
     console.line(format_args!("  host: {heights:.1} MiB of heights, {picture:.1} MiB of picture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
     match memory.tiles {
-        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB"))?,
+        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB (twice that on a software adapter)"))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 16 MiB)"
+            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 16 MiB; twice all that on a software adapter)"
         ))?,
     }
     Ok(())

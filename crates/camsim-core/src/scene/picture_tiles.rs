@@ -7,14 +7,17 @@
 
 use std::{mem::size_of_val, sync::Arc};
 
-use super::{Encoding, MipLevel, Texture};
+use super::{Encoding, MipLevel, TexelForm, Texture};
 
 /// Texels of a version along a tile's side.
 pub const TILE_TEXELS: u32 = 254;
 /// With one more at each end.
 pub const TILE_SIDE: u32 = TILE_TEXELS + 2;
-/// Memory of a tile.
-pub const TILE_BYTES: u64 = 4 * (TILE_SIDE as u64) * (TILE_SIDE as u64);
+/// Memory of a tile on a device.
+#[must_use]
+pub const fn tile_bytes(form: TexelForm) -> u64 {
+    form.bytes() as u64 * (TILE_SIDE as u64) * (TILE_SIDE as u64)
+}
 
 /// A picture that takes more than this with its smaller versions is cut into tiles even where an adapter has textures as large.
 pub const WHOLE_BYTES: u64 = 512 << 20;
@@ -121,14 +124,21 @@ pub struct TileSource {
     /// How it is cut.
     pub grid: TileGrid,
     texture: Arc<Texture>,
+    form: TexelForm,
     mips: Vec<MipLevel>,
 }
 
 impl TileSource {
     /// Computes the smaller versions.
     #[must_use]
-    pub fn new(texture: &Arc<Texture>) -> Self {
-        Self { grid: TileGrid::new(texture.size_px), texture: texture.clone(), mips: texture.mips() }
+    pub fn new(texture: &Arc<Texture>, form: TexelForm) -> Self {
+        Self { grid: TileGrid::new(texture.size_px), texture: texture.clone(), form, mips: texture.mips(form) }
+    }
+
+    /// What [`TileSource::texels`] are.
+    #[must_use]
+    pub fn form(&self) -> TexelForm {
+        self.form
     }
 
     /// Meaning of its bytes.
@@ -137,10 +147,10 @@ impl TileSource {
         self.texture.encoding
     }
 
-    /// Memory of picture and versions, bytes: 16/3 a texel.
+    /// Memory of picture and versions, bytes: 16/3 a texel, 20/3 with versions of [`TexelForm::Light`].
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        let mips: usize = self.mips.iter().map(|mip| size_of_val(&*mip.rgba8)).sum();
+        let mips: usize = self.mips.iter().map(|mip| size_of_val(&*mip.texels)).sum();
         (size_of_val(&*self.texture.rgba8) + mips) as u64
     }
 
@@ -148,22 +158,29 @@ impl TileSource {
     #[must_use]
     pub fn texels(&self, tile: u32) -> Vec<u8> {
         let (level, at) = self.grid.place(tile);
-        let rgba8 = if level == 0 { &self.texture.rgba8 } else { &self.mips[level - 1].rgba8 };
+        match level.checked_sub(1) {
+            // The picture itself stands there in bytes.
+            None => self.texture.texels(&self.cut(0, at, &self.texture.rgba8, TexelForm::Stored.bytes()), self.form).into_owned(),
+            Some(version) => self.cut(level, at, &self.mips[version].texels, self.form.bytes()),
+        }
+    }
+
+    fn cut(&self, level: usize, at: [u32; 2], texels: &[u8], bytes: usize) -> Vec<u8> {
         let [width, height] = self.grid.sizes[level];
         let [west, north] = at.map(|n| i64::from(n * TILE_TEXELS) - 1);
         let within = |at: i64, side: u32| at.clamp(0, i64::from(side) - 1) as usize;
-        let mut texels = Vec::with_capacity(TILE_BYTES as usize);
+        let mut tile = Vec::with_capacity(bytes * (TILE_SIDE * TILE_SIDE) as usize);
         for row in 0..i64::from(TILE_SIDE) {
-            let row = &rgba8[4 * within(north + row, height) * width as usize..][..4 * width as usize];
+            let row = &texels[bytes * within(north + row, height) * width as usize..][..bytes * width as usize];
             // What lies within the picture is one piece; its ends are repeated to both sides.
             let [first, last] = [west, west + i64::from(TILE_SIDE) - 1].map(|column| within(column, width));
             let before = first as i64 - west;
-            (0..before).for_each(|_| texels.extend_from_slice(&row[..4]));
-            texels.extend_from_slice(&row[4 * first..4 * last + 4]);
+            (0..before).for_each(|_| tile.extend_from_slice(&row[..bytes]));
+            tile.extend_from_slice(&row[bytes * first..bytes * (last + 1)]);
             let after = i64::from(TILE_SIDE) - before - (last - first) as i64 - 1;
-            (0..after).for_each(|_| texels.extend_from_slice(&row[4 * last..4 * last + 4]));
+            (0..after).for_each(|_| tile.extend_from_slice(&row[bytes * last..bytes * (last + 1)]));
         }
-        texels
+        tile
     }
 }
 
@@ -178,13 +195,21 @@ mod tests {
 
     #[test]
     fn tiles_hold_every_version_with_a_border_around() {
+        for form in [TexelForm::Stored, TexelForm::Light] {
+            expect_every_version(form);
+        }
+    }
+
+    fn expect_every_version(form: TexelForm) {
         let texture = picture([700, 259]);
-        let source = TileSource::new(&texture);
+        let source = TileSource::new(&texture, form);
+        let whole = texture.texels(&texture.rgba8, form);
+        let bytes = form.bytes();
         let versions: Vec<_> =
-            [(texture.size_px, &texture.rgba8)].into_iter().chain(source.mips.iter().map(|mip| (mip.size_px, &mip.rgba8))).collect();
+            [(texture.size_px, &*whole)].into_iter().chain(source.mips.iter().map(|mip| (mip.size_px, &*mip.texels))).collect();
         assert_eq!(versions.iter().map(|version| version.0).collect::<Vec<_>>(), source.grid.sizes);
         assert_eq!(source.grid.count, 3 * 2 + 2 + 8);
-        for (level, ([width, height], rgba8)) in versions.into_iter().enumerate() {
+        for (level, ([width, height], expected_texels)) in versions.into_iter().enumerate() {
             let across = source.grid.tiles(level)[0];
             for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
                 let tile = source.grid.first[level] + y / TILE_TEXELS * across + x / TILE_TEXELS;
@@ -196,10 +221,10 @@ mod tests {
                 // And its neighbours, which may lie in other tiles.
                 for (dx, dy) in [(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)] {
                     let [column, row] = [(x % TILE_TEXELS) as i32 + 1 + dx, (y % TILE_TEXELS) as i32 + 1 + dy];
-                    let at = 4 * (row * TILE_SIDE as i32 + column) as usize;
+                    let at = bytes * (row * TILE_SIDE as i32 + column) as usize;
                     let [i, j] = [(x as i32 + dx).clamp(0, width as i32 - 1), (y as i32 + dy).clamp(0, height as i32 - 1)];
-                    let expected = 4 * (j * width as i32 + i) as usize;
-                    assert_eq!(texels[at..at + 4], rgba8[expected..expected + 4], "{level} {x} {y} {dx} {dy}");
+                    let expected = bytes * (j * width as i32 + i) as usize;
+                    assert_eq!(texels[at..at + bytes], expected_texels[expected..expected + bytes], "{level} {x} {y} {dx} {dy}");
                 }
                 break;
             }

@@ -1,7 +1,8 @@
 //! Pictures that cover surfaces, and their smaller versions.
 
-use std::fmt;
+use std::{borrow::Cow, fmt};
 
+use half::f16;
 use rayon::prelude::*;
 
 /// How the colour bytes of a [`Texture`] stand for light. Alpha is always linear.
@@ -85,13 +86,34 @@ pub struct Texture {
     pub encoding: Encoding,
 }
 
-/// One of the smaller versions of a [`Texture`], in the encoding of the texture.
+/// How a device holds the texels of a [`Texture`]: R G B A, not premultiplied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TexelForm {
+    /// Bytes in the texture's [`Encoding`], which the device decodes.
+    Stored,
+    /// Half floats of linear light, for devices that decode roughly: Mesa's software driver takes a polynomial of the third degree for the sRGB curve, which
+    /// is off by up to 0.36/255 of the linear range. Halves round by at most 2^-12 of the value. Smaller versions have not been rounded to bytes.
+    Light,
+}
+
+impl TexelForm {
+    /// Bytes of a texel.
+    #[must_use]
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Stored => 4,
+            Self::Light => 8,
+        }
+    }
+}
+
+/// One of the smaller versions of a [`Texture`].
 #[derive(Clone, PartialEq)]
 pub struct MipLevel {
     /// Width, height.
     pub size_px: [u32; 2],
-    /// `4 * width * height` bytes, R G B A, not premultiplied.
-    pub rgba8: Vec<u8>,
+    /// Row after row, in the form that was asked for.
+    pub texels: Vec<u8>,
 }
 
 impl fmt::Debug for Texture {
@@ -138,7 +160,7 @@ impl Texture {
     ///
     /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it covers, so odd sizes keep
     /// the picture in place. Colour is weighted by alpha: pixels without content do not darken their neighbours.
-    pub fn mips(&self) -> Vec<MipLevel> {
+    pub fn mips(&self, form: TexelForm) -> Vec<MipLevel> {
         let mut levels = Vec::new();
         if self.size_px == [1, 1] {
             return levels;
@@ -147,12 +169,32 @@ impl Texture {
         // The picture itself never stands there in floats: of a large one they would take four times its memory.
         let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| linear(&table, &self.rgba8[4 * at..4 * at + 4]));
         loop {
-            levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), rgba8: image.encode(self.encoding) });
+            let texels = match form {
+                TexelForm::Stored => image.encode(self.encoding),
+                TexelForm::Light => image.halves(),
+            };
+            levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), texels });
             if image.size_px == [1, 1] {
                 return levels;
             }
             image = image.half();
         }
+    }
+
+    /// The texels of the picture itself, or of a piece of it (`rgba8`), in a form.
+    pub fn texels<'a>(&self, rgba8: &'a [u8], form: TexelForm) -> Cow<'a, [u8]> {
+        if form == TexelForm::Stored {
+            return Cow::Borrowed(rgba8);
+        }
+        let [color, alpha] =
+            [self.encoding, Encoding::Linear].map(|encoding| encoding.decode_table().map(|value| f16::from_f32(value).to_ne_bytes()));
+        let mut halves = vec![0; 2 * rgba8.len()];
+        halves.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(rgba8.par_chunks_exact(4)).for_each(|(out, texel)| {
+            for (k, (half, &byte)) in out.chunks_exact_mut(2).zip(texel).enumerate() {
+                half.copy_from_slice(&if k < 3 { &color } else { &alpha }[usize::from(byte)]);
+            }
+        });
+        Cow::Owned(halves)
     }
 
     /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear sampling across the border of
@@ -162,7 +204,7 @@ impl Texture {
         if transparent.peek().is_none() {
             return;
         }
-        let levels = self.mips();
+        let levels = self.mips(TexelForm::Stored);
         let width = self.size_px[0] as usize;
         let [full_width, full_height] = self.size_px.map(|n| n as usize);
         for (index, pixel) in self.rgba8.chunks_exact_mut(4).enumerate().filter(|(_, pixel)| pixel[3] == 0) {
@@ -170,7 +212,7 @@ impl Texture {
             let donor = levels.iter().find_map(|level| {
                 let [w, h] = level.size_px.map(|n| n as usize);
                 let at = 4 * ((y * h / full_height).min(h - 1) * w + (x * w / full_width).min(w - 1));
-                (level.rgba8[at + 3] > 0).then(|| &level.rgba8[at..at + 3])
+                (level.texels[at + 3] > 0).then(|| &level.texels[at..at + 3])
             });
             if let Some(rgb) = donor {
                 pixel[..3].copy_from_slice(rgb);
@@ -224,6 +266,18 @@ impl LinearImage {
         });
         bytes
     }
+
+    fn halves(&self) -> Vec<u8> {
+        let mut bytes = vec![0; TexelForm::Light.bytes() * self.premultiplied.len()];
+        bytes.par_chunks_exact_mut(TexelForm::Light.bytes()).zip(&self.premultiplied).for_each(|(out, &[r, g, b, alpha])| {
+            if alpha > 0.0 {
+                for (half, value) in out.chunks_exact_mut(2).zip([r / alpha, g / alpha, b / alpha, alpha]) {
+                    half.copy_from_slice(&f16::from_f32(value).to_ne_bytes());
+                }
+            }
+        });
+        bytes
+    }
 }
 
 /// Source pixels that target pixel `to` of `to_size` covers among `from_size`: the first one and the share of each (sum 1).
@@ -264,11 +318,11 @@ mod tests {
     #[test]
     fn averaging_happens_in_linear_light() {
         let texture = Texture { size_px: [2, 1], rgba8: vec![0, 0, 0, 255, 255, 255, 255, 255], encoding: Encoding::Srgb };
-        let mips = texture.mips();
+        let mips = texture.mips(TexelForm::Stored);
         // Half of the light is sRGB 188, not 128.
-        assert_eq!((mips.len(), &mips[0].rgba8[..]), (1, &[188, 188, 188, 255][..]));
+        assert_eq!((mips.len(), &mips[0].texels[..]), (1, &[188, 188, 188, 255][..]));
         let linear = Texture { encoding: Encoding::Linear, ..texture };
-        assert_eq!(linear.mips()[0].rgba8, [128, 128, 128, 255]);
+        assert_eq!(linear.mips(TexelForm::Stored)[0].texels, [128, 128, 128, 255]);
     }
 
     #[test]
@@ -279,10 +333,10 @@ mod tests {
             rgba8: [10, 20, 30, 40, 50].iter().flat_map(|&v| [v, v, v, 255]).collect(),
             encoding: Encoding::Linear,
         };
-        let mips = texture.mips();
+        let mips = texture.mips(TexelForm::Stored);
         assert_eq!(mips.iter().map(|m| m.size_px).collect::<Vec<_>>(), [[2, 1], [1, 1]]);
-        assert_eq!((mips[0].rgba8[0], mips[0].rgba8[4]), (18, 42));
-        assert_eq!(mips[1].rgba8[0], 30);
+        assert_eq!((mips[0].texels[0], mips[0].texels[4]), (18, 42));
+        assert_eq!(mips[1].texels[0], 30);
         for size in [2, 3, 5, 7, 100, 641, 917] {
             for to in 0..size / 2 {
                 let (first, weights) = cover(to, size, size / 2);
@@ -296,14 +350,41 @@ mod tests {
     fn void_pixels_do_not_darken() {
         let mut texture =
             Texture { size_px: [4, 1], rgba8: vec![0, 0, 0, 0, 200, 100, 50, 255, 0, 0, 0, 0, 0, 0, 0, 0], encoding: Encoding::Srgb };
-        let mips = texture.mips();
-        assert_eq!(&mips[0].rgba8[..4], [200, 100, 50, 128]);
-        assert_eq!(&mips[0].rgba8[4..], [0, 0, 0, 0]);
-        assert_eq!(&mips[1].rgba8[..], [200, 100, 50, 64]);
+        let mips = texture.mips(TexelForm::Stored);
+        assert_eq!(&mips[0].texels[..4], [200, 100, 50, 128]);
+        assert_eq!(&mips[0].texels[4..], [0, 0, 0, 0]);
+        assert_eq!(&mips[1].texels[..], [200, 100, 50, 64]);
         texture.bleed_into_transparent();
         for pixel in texture.rgba8.chunks_exact(4) {
             assert_eq!(pixel[..3], [200, 100, 50]);
         }
         assert_eq!(texture.rgba8.iter().skip(3).step_by(4).copied().collect::<Vec<_>>(), [0, 255, 0, 0]);
+    }
+
+    #[test]
+    fn halves_are_the_light_of_bytes_and_versions_are_not_rounded_to_bytes() {
+        let halves = |bytes: &[u8]| -> Vec<f64> { bytes.chunks_exact(2).map(|b| f16::from_ne_bytes([b[0], b[1]]).to_f64()).collect() };
+        let exact = |byte: u8| {
+            let stored = f64::from(byte) / 255.0;
+            if stored <= 0.040_45 { stored / 12.92 } else { ((stored + 0.055) / 1.055).powf(2.4) }
+        };
+        // A half has 11 bits.
+        let near = |found: f64, exact: f64| (found - exact).abs() <= exact / 4095.0;
+        let rgba8: Vec<u8> = (0..=255).flat_map(|byte| [byte, byte, 255 - byte, byte]).collect();
+        let texture = Texture { size_px: [16, 16], rgba8, encoding: Encoding::Srgb };
+        let whole = halves(&texture.texels(&texture.rgba8, TexelForm::Light));
+        for (byte, texel) in (0..=255_u8).zip(whole.chunks_exact(4)) {
+            let expected = [exact(byte), exact(byte), exact(255 - byte), f64::from(byte) / 255.0];
+            assert!((0..4).all(|k| near(texel[k], expected[k])), "{byte}: {texel:?} {expected:?}");
+        }
+        assert_eq!(*texture.texels(&texture.rgba8, TexelForm::Stored), texture.rgba8);
+        // The mean of two neighbours, where bytes have only one of the two.
+        let pair = Texture { size_px: [2, 1], rgba8: vec![200, 40, 9, 255, 201, 41, 10, 255], encoding: Encoding::Srgb };
+        let mips = pair.mips(TexelForm::Light);
+        let found = halves(&mips[0].texels);
+        for (k, byte) in [200, 40, 9].into_iter().enumerate() {
+            assert!(near(found[k], 0.5 * (exact(byte) + exact(byte + 1))), "{byte}: {}", found[k]);
+        }
+        assert_eq!((mips[0].size_px, found[3]), ([1, 1], 1.0));
     }
 }

@@ -10,7 +10,10 @@ use rayon::prelude::*;
 use super::{CHUNK_CELLS, Terrain, TerrainDetail, lattice::NODE_CELLS};
 use crate::{
     plan::SurfaceReads,
-    scene::picture_tiles::{TILE_BYTES, TileGrid},
+    scene::{
+        picture_tiles::{TileGrid, tile_bytes},
+        texture::TexelForm,
+    },
 };
 
 /// A triangle over several cells is at most this much steeper than the steepest cell below it: it follows from the cells' slopes along two
@@ -96,8 +99,8 @@ impl GroundTiles {
 
     /// Memory that all tiles of the picture would take on a device.
     #[must_use]
-    pub fn bytes(&self) -> u64 {
-        u64::from(self.grid.count) * TILE_BYTES
+    pub fn bytes(&self, form: TexelForm) -> u64 {
+        u64::from(self.grid.count) * tile_bytes(form)
     }
 }
 
