@@ -30,6 +30,7 @@ mod frame_plan;
 mod grain;
 mod holes;
 mod keys;
+mod layers;
 mod levels;
 mod lines;
 mod look;
@@ -58,6 +59,7 @@ pub(crate) use error::MOST_VOID_SHARE;
 pub use frame_plan::{FramePlan, Motion, Skip};
 pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
+pub use layers::Layers;
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
 pub use predicted::Predicted;
@@ -233,8 +235,9 @@ impl Planner {
             blur,
             straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
-            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, &picture),
+            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, &picture, scenery.layers_dn()),
             silhouettes: picture.silhouettes,
+            layers: scenery.layers,
             silhouettes_in_view: scenery.reason_for_none.is_none(),
             constant_twist: look.common.is_none(),
             surfaces: &self.surfaces,

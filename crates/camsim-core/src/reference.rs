@@ -63,6 +63,8 @@ pub struct Oracle {
     ground: Option<Ground>,
     meshes: Meshes,
     paint: Paint,
+    /// Whether anything is mixed with what is behind it.
+    blends: bool,
 }
 
 /// What a place of the picture sees at one instant.
@@ -137,6 +139,7 @@ impl Oracle {
             ground: scene.terrain.as_ref().map(Ground::new),
             meshes: Meshes::new(&scene.meshes, scene.light),
             paint: Paint::new(scene),
+            blends: scene.has_blended(),
             sequence,
         })
     }
@@ -177,21 +180,51 @@ impl Oracle {
         self.view(frame).look(pixel, offset_px, phase)
     }
 
-    /// First surface along `origin + t direction`, t > 0; [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in the
+    /// First surface along `origin + t direction`, t > 0, of what is mixed with what is behind it that from its cut-off on; [`Hit::depth_m`] is t, which is planar depth for a direction with z = 1 in the
     /// camera. Surfaces are met from both sides. `None` also for numbers that are not finite.
     #[must_use]
     pub fn cast(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Hit> {
         let ray = Ray::new(origin_ned_m, direction_ned)?;
-        let terrain = self.sequence.scene.terrain.as_ref();
-        let on_ground = terrain.zip(self.ground.as_ref()).and_then(|(terrain, ground)| ground.first(terrain, &ray, f64::INFINITY));
+        let on_ground = self.on_ground(&ray);
         let limit = on_ground.map_or(f64::INFINITY, |hit| hit.depth_m);
         self.meshes.first(&ray, limit).or(on_ground)
     }
 
-    /// Linear light that a ray brings, with fog by slant range.
+    fn on_ground(&self, ray: &Ray) -> Option<Hit> {
+        let terrain = self.sequence.scene.terrain.as_ref();
+        terrain.zip(self.ground.as_ref()).and_then(|(terrain, ground)| ground.first(terrain, ray, f64::INFINITY))
+    }
+
+    /// Linear light that a ray brings from the one surface that it is said to meet, with fog by slant range: where nothing is mixed, that is
+    /// all. [`Oracle::light`] knows of layers.
     #[must_use]
     pub fn color(&self, uv: DVec2, hit: Option<&Hit>) -> DVec3 {
         self.paint.color(hit, uv.extend(1.0).length())
+    }
+
+    /// Linear light that the ray `uv` of a camera brings: of what lets none through, and of every layer before it, each at its own place and
+    /// mixed by its alpha with what is behind it.
+    #[must_use]
+    pub fn light(&self, pose: &CameraPose, uv: DVec2) -> DVec3 {
+        let (way, range_per_depth) = (uv.extend(1.0), uv.extend(1.0).length());
+        let direction = pose.ned_from_camera * way;
+        if !self.blends {
+            return self.paint.color(self.cast(pose.position_ned_m, direction).as_ref(), range_per_depth);
+        }
+        let Some(ray) = Ray::new(pose.position_ned_m, direction) else { return self.paint.color(None, range_per_depth) };
+        let on_ground = self.on_ground(&ray);
+        let limit = on_ground.map_or(f64::INFINITY, |hit| hit.depth_m);
+        let solid = self.meshes.first_solid(&ray, limit).or(on_ground);
+        let mut layers = self.meshes.layers(&ray, solid.map_or(f64::INFINITY, |hit| hit.depth_m));
+        // From the eye on: what is left of the light from behind becomes less with each layer.
+        layers.sort_by(|a, b| a.hit.depth_m.total_cmp(&b.hit.depth_m));
+        let (mut sum, mut left) = (DVec3::ZERO, 1.0);
+        for layer in &layers {
+            let alpha = layer.alpha.clamp(0.0, 1.0);
+            sum += left * alpha * self.paint.color(Some(&layer.hit), range_per_depth);
+            left *= 1.0 - alpha;
+        }
+        sum + left * self.paint.color(solid.as_ref(), range_per_depth)
     }
 
     /// Whether anything stands between two points; the last millionth of the way does not count.

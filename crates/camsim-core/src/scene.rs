@@ -10,6 +10,7 @@ pub(crate) mod box_tree;
 pub mod levels;
 pub mod light;
 pub mod mesh;
+pub mod paint_order;
 pub mod picture_tiles;
 pub mod terrain;
 pub mod texture;
@@ -41,6 +42,12 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether anything is mixed with what is behind it.
+    #[must_use]
+    pub fn has_blended(&self) -> bool {
+        self.meshes.iter().any(|mesh| mesh.material.blends)
+    }
+
     /// Boxes around all meshes, NED.
     #[must_use]
     pub fn mesh_bounds(&self) -> Vec<Aabb> {

@@ -23,7 +23,8 @@ pub(super) struct Crossed {
     pub borders: u32,
     /// Squared error, of the linear range, mean over the area that the lines stand for, of borders that run along whole pixels of the camera's size.
     pub stairs: f64,
-    /// The same of borders between meshes that touch, as a window and its wall do: depth tells nothing of them, so that rays leave them as they are.
+    /// The same of borders between meshes that touch, as a window and its wall do: depth tells nothing of them, so that rays leave
+    /// them as they are; and of what is mixed with what is behind it, where it has no depth.
     pub flush: f64,
     /// The same where depth bends between them, as at a wall's foot: samples finer than a pixel find that, the middles of pixels do not.
     pub feet: f64,
@@ -47,8 +48,11 @@ impl Search<'_> {
                 let either = |is: &dyn Fn([f64; 3]) -> bool| (k > 0 && is(around(k - 1))) || (k + 2 < PLACES && is(around(k)));
                 let may = either(&may_step);
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
-                let color = |k: usize| self.surfaces.color(met[k].as_ref(), uv(k as f64).extend(1.0).length());
-                let square = || (color(k) - color(k + 1)).length_squared() / 3.0;
+                let light = |k: usize| {
+                    let way = uv(k as f64).extend(1.0);
+                    self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[k].as_ref(), way.length())
+                };
+                let square = || (light(k).color - light(k + 1).color).length_squared() / 3.0;
                 let mesh = |k: usize| met[k].as_ref().map_or(0, |met| met.surface);
                 if may && steps(inverse_depths[k], inverse_depths[k + 1], between) {
                     borders += 1;
@@ -56,6 +60,9 @@ impl Search<'_> {
                 } else if mesh(k) != mesh(k + 1) && mesh(k) * mesh(k + 1) > 0 {
                     let side = if either(&|depths| bends(depths, FINE_EDGE_STEP)) { &mut feet2 } else { &mut flush2 };
                     *side += square();
+                } else if self.surfaces.blends() && light(k).panes != light(k + 1).panes {
+                    // The border of what is mixed and has no depth of its own.
+                    flush2 += square();
                 }
             }
         }

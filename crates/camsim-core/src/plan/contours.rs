@@ -210,7 +210,10 @@ impl Search<'_> {
         let towards = places.iter().zip(inverse_depth).fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
         let normal = (self.reach.camera.focal_px * (probe.uv_from_px * towards)).normalize_or_zero();
         let strip_px = |&[a, b]: &[usize; 2]| (key_px(inverse_depth[a]) - key_px(inverse_depth[b])).dot(normal).abs();
-        let color = |i: usize| self.surfaces.color(met[i].as_ref(), uv(places[i]).extend(1.0).length());
+        let color = |i: usize| {
+            let way = uv(places[i]).extend(1.0);
+            self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[i].as_ref(), way.length()).color
+        };
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
         // Between places 3 px apart a crease bends threefold.
         let is_fold = |line: &[usize; 3]| bends(line.map(|i| inverse_depth[i]), f64::from(NEAR_PX) * FOLD);

@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::{
-    BlurStage, EdgeStage, FramePlan, Holes, Motion, NodeDepths, PathStage, Predicted, RayStage, Skip, SurfaceReads, TemporalStage,
+    BlurStage, EdgeStage, FramePlan, Holes, Layers, Motion, NodeDepths, PathStage, Predicted, RayStage, Skip, SurfaceReads, TemporalStage,
 };
 use crate::{
     scenario::Preset,
@@ -225,9 +225,12 @@ impl Predicted {
             writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
         let silhouettes = self.silhouettes.map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
+        let layers = self.layers.map_or_else(String::new, |Layers { share, error_dn }| {
+            format!(", {error_dn:.2} as light mixed of several surfaces ({:.0} % of the picture) moves with the depth of one", 100.0 * share)
+        });
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{silhouettes}: {}",
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{silhouettes}{layers}: {}",
             if self.levels_kept { "within the tolerance" } else { "the tolerance is NOT KEPT" }
         )?;
         match &self.levels_in_the_way {

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, Contours, Holes, KeyFrame, LensReach, Motion, NodeDepths, Predicted, RayStage, TemporalStage,
+    BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     exposure::{MOST_STEPS, miss_px},
     levels::Expected,
@@ -75,6 +75,8 @@ pub(super) struct Case<'a> {
     pub levels_in_the_way: Option<String>,
     /// Cost of silhouettes.
     pub silhouettes: Option<Contours>,
+    /// Cost of what is mixed.
+    pub layers: Option<Layers>,
     pub silhouettes_in_view: bool,
     /// Whether the camera's twist at the key instant may stand for its motion.
     pub constant_twist: bool,
@@ -404,6 +406,7 @@ impl Forecast<'_> {
             resampling_dn,
             blur_dn,
             silhouettes: case.silhouettes,
+            layers: case.layers,
             levels_kept: case.levels_in_the_way.is_none(),
             levels_in_the_way: case.levels_in_the_way.clone(),
             total_px,

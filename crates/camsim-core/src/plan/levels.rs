@@ -266,10 +266,20 @@ fn dn(square: f64) -> f64 {
 }
 
 /// Why the tolerance is not kept; `None` if it is.
-pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, expected: Expected, picture: &Picture) -> Option<String> {
+pub(super) fn in_the_way(
+    quality: &QualitySpec,
+    sampling: &Sampling,
+    expected: Expected,
+    picture: &Picture,
+    by_layers_dn: f64,
+) -> Option<String> {
     let at_silhouettes_dn = picture.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-    if quality.preset == Preset::Paper || expected.total_dn().hypot(at_silhouettes_dn) <= ROUNDED * quality.max_error_dn {
+    let total_dn = expected.total_dn().hypot(at_silhouettes_dn).hypot(by_layers_dn);
+    if quality.preset == Preset::Paper || total_dn <= ROUNDED * quality.max_error_dn {
         return None;
+    }
+    if by_layers_dn > expected.total_dn().max(at_silhouettes_dn) {
+        return Some(format!("what is mixed of several surfaces moves with the depth of one: {by_layers_dn:.2}/255"));
     }
     if at_silhouettes_dn > expected.total_dn() {
         let how = if picture.is_plain { "where they are left as they are" } else { "with rays of their own" };

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{
     BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges,
-    error, exposure, forced, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
+    error, exposure, forced, layers, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -41,6 +41,8 @@ pub(super) struct Scenery<'a> {
     pub reason_for_none: Option<String>,
     /// What silhouettes cost; `None` where nobody asks.
     pub outlook: Option<contours::Outlook>,
+    /// What mixed light costs; `None` where nothing is mixed.
+    pub layers: Option<layers::Layers>,
 }
 
 impl Planner {
@@ -124,6 +126,7 @@ impl<'a> Look<'a> {
         Scenery {
             prospect: prospect::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
+            layers: self.layers(),
             ideal,
             motion,
             reason_for_none,
@@ -149,7 +152,24 @@ impl<'a> Look<'a> {
     }
 }
 
+impl Look<'_> {
+    /// What mixed light costs.
+    fn layers(&self) -> Option<layers::Layers> {
+        let Planner { sequence, shutter, surfaces, .. } = self.planner;
+        let &Self { stamp_s, ref key_pose, ref reach, .. } = self;
+        let gain = &prospect::gain(sequence, &reach.camera);
+        let search = layers::Search { reach, surfaces, path: self.path(), shutter, stamp_s, key_pose, gain };
+        // The paper's errors are not judged.
+        if self.is_paper() { None } else { search.layers() }
+    }
+}
+
 impl Scenery<'_> {
+    /// RMS error over the picture by mixed light, 1/255 of the linear range.
+    pub fn layers_dn(&self) -> f64 {
+        self.layers.map_or(0.0, |layers| layers.error_dn)
+    }
+
     /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
     pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
         let is_auto = quality.silhouettes == Silhouettes::Auto;

@@ -38,22 +38,23 @@ impl Look<'_> {
             exposure: self.exposed(scenery.motion, &scenery.ideal).path(quality, &mut Vec::new()),
         };
         let Scenery { prospect, outlook, .. } = scenery;
+        let layers_dn = scenery.layers_dn();
         let given = self.common.and_then(|common| common.given);
         let Some(outlook) = outlook else {
-            let usual = |scale: f64| is_usual(scale, &task).then_some(0.0);
-            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, 0.0));
+            let usual = |scale: f64| is_usual(scale, &task).then_some(layers_dn);
+            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, layers_dn));
             return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
         };
         let plain = || match given {
-            Some(given) => prospect.given(&given, &task, outlook.plain(given.scale).error_dn),
-            None => prospect.choose(&task, &|scale| plain_dn(outlook, &task, scale)),
+            Some(given) => prospect.given(&given, &task, outlook.plain(given.scale).error_dn.hypot(layers_dn)),
+            None => prospect.choose(&task, &|scale| Some(plain_dn(outlook, &task, scale)?.hypot(layers_dn))),
         };
         let with_rays = || {
             let most_fine = |scale: f64| {
                 let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
                 edges::most_fine(size_px, self.planner.max_side_px)
             };
-            with_rays(prospect, &task, outlook, &most_fine)
+            with_rays(prospect, &task, outlook, layers_dn, &most_fine)
         };
         let (choice, is_plain, fine) = match quality.silhouettes {
             Silhouettes::Plain => (plain(), true, 1),
@@ -111,10 +112,16 @@ fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
 
 /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
 /// that these are for what the finest ideal frame does not do.
-fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
+fn with_rays(
+    prospect: &Prospect<'_>,
+    task: &Task<'_>,
+    outlook: &Outlook,
+    layers_dn: f64,
+    most_fine: &dyn Fn(f64) -> u32,
+) -> (Choice, u32) {
     let choose = |fine: u32| {
         let may = |scale: f64| fine <= most_fine(scale) && (fine == 1 || is_usual(scale, task));
-        let choice = prospect.choose(task, &|scale| may(scale).then(|| outlook.with_rays(scale, fine).error_dn));
+        let choice = prospect.choose(task, &|scale| may(scale).then(|| outlook.with_rays(scale, fine).error_dn.hypot(layers_dn)));
         (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
     };
     let mut failed = Vec::new();

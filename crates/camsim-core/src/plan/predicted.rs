@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Contours, Holes};
+use super::{Contours, Holes, Layers};
 
 /// Predicted errors of a frame. All `_px` are pixels of the ideal frame and bound the 99th percentile over the valid pixels that are
 /// farther than 3 px from any silhouette.
@@ -27,7 +27,9 @@ pub struct Predicted {
     /// What silhouettes cost, as they are made: left as the ideal frame's pixels show them, or with rays of their own. `None` where none can be in view, or
     /// nobody asks.
     pub silhouettes: Option<Contours>,
-    /// Whether all three together are within `quality.max_error_dn`.
+    /// Light that is mixed of several surfaces, and what it costs that it follows the depth of one. `None` where nothing in the scene is.
+    pub layers: Option<Layers>,
+    /// Whether all of them together are within `quality.max_error_dn`.
     pub levels_kept: bool,
     /// If not: what is in the way.
     pub levels_in_the_way: Option<String>,
@@ -54,6 +56,7 @@ impl Predicted {
     #[must_use]
     pub fn picture_dn(&self) -> f64 {
         let at_silhouettes_dn = self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn)
+        let by_layers_dn = self.layers.map_or(0.0, |layers| layers.error_dn);
+        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn).hypot(by_layers_dn)
     }
 }

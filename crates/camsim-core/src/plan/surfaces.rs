@@ -1,13 +1,13 @@
 //! What the plan's rays meet: the terrain at full detail and every mesh.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{cell::RefCell, collections::HashMap, sync::Arc};
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::NEAR_M;
 use crate::{
     pose::CameraPose,
-    scene::{Aabb, Encoding, Scene, Shape, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
+    scene::{Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
 };
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -22,6 +22,8 @@ pub(super) struct Surfaces {
     shapes: Vec<Arc<BoxTree>>,
     /// From NED to the axes of each mesh's shape.
     shape_from_ned: Vec<DMat3>,
+    /// Whether anything is mixed with what is behind it.
+    blends: bool,
     /// Linear light of each byte of a picture, by [`Encoding`].
     linear: [(Encoding, [f32; 256]); 2],
 }
@@ -39,6 +41,15 @@ pub(super) struct Met {
     pub tint: DVec3,
     /// The place on the terrain, if it is that.
     pub terrain: Option<TerrainHit>,
+}
+
+/// Light along a ray.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Light {
+    /// Linear.
+    pub color: DVec3,
+    /// The surfaces that it is mixed by, from the eye on; as in [`Met`].
+    pub panes: Vec<usize>,
 }
 
 impl Surfaces {
@@ -60,7 +71,8 @@ impl Surfaces {
         let tree = BoxTree::new(&scene.mesh_bounds());
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
-        Self { scene, tree, shapes, shape_from_ned, linear }
+        let blends = scene.has_blended();
+        Self { scene, tree, shapes, shape_from_ned, blends, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
@@ -69,15 +81,26 @@ impl Surfaces {
 
     /// Whether there is anything but ground and pictures on it.
     pub fn has_models(&self) -> bool {
-        self.scene.meshes.iter().any(|mesh| mesh.shape.indices.len() > 6)
+        self.blends || self.scene.meshes.iter().any(|mesh| mesh.shape.indices.len() > 6)
+    }
+
+    /// Whether anything is mixed with what is behind it.
+    pub fn blends(&self) -> bool {
+        self.blends
     }
 
     /// First surface along `origin + t direction`, t >= 0.
     pub fn meet(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
+        self.meet_of(origin_ned_m, direction_ned, |_| true)
+    }
+
+    fn meet_of(&self, origin_ned_m: DVec3, direction_ned: DVec3, counts: impl Fn(&Mesh) -> bool) -> Option<Met> {
         let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         let on_mesh = self.tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
-            self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit).map(|met| (met.depth_m, met))
+            let counts = counts(&self.scene.meshes[mesh as usize]);
+            let met = counts.then(|| self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit)).flatten();
+            met.map(|met| (met.depth_m, met))
         });
         let on_ground = || ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, tint: DVec3::ONE, terrain: Some(hit) });
         on_mesh.map(|(_, met)| met).or_else(on_ground)
@@ -95,9 +118,50 @@ impl Surfaces {
             mesh.shows(corners, weights, direction_ned).then_some((t, (corners, weights)))
         };
         let (depth_m, (corners, weights)) = self.shapes[i].first(origin, direction, limit, meet)?;
+        Some(self.met(i, depth_m, corners, weights, direction_ned))
+    }
+
+    fn met(&self, i: usize, depth_m: f64, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> Met {
+        let mesh = &self.scene.meshes[i];
         let [r, g, b, _] = mesh.tint_at(corners, weights);
         let light = self.scene.light.map_or(1.0, |light| mesh.light_at(&light, corners, weights, direction_ned));
-        Some(Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: light * DVec3::new(r, g, b), terrain: None })
+        Met { depth_m, surface: 1 + i, uv: mesh.uv_at(corners, weights), tint: light * DVec3::new(r, g, b), terrain: None }
+    }
+
+    /// Linear light that arrives along a ray: of `met`, what it first meets, or where surfaces are mixed of all of those.
+    pub fn light(&self, origin_ned_m: DVec3, direction_ned: DVec3, met: Option<&Met>, range_per_depth: f64) -> Light {
+        if !self.blends {
+            return Light { color: self.color(met, range_per_depth), panes: Vec::new() };
+        }
+        let solid = self.meet_of(origin_ned_m, direction_ned, |mesh| !mesh.material.blends);
+        let panes = self.panes(origin_ned_m, direction_ned, solid.map_or(f64::INFINITY, |met| met.depth_m));
+        let behind = self.color(solid.as_ref(), range_per_depth);
+        let over = |behind: DVec3, (met, alpha): &(Met, f64)| behind.lerp(self.color(Some(met), range_per_depth), *alpha);
+        Light { color: panes.iter().rev().fold(behind, over), panes: panes.iter().map(|(met, _)| met.surface).collect() }
+    }
+
+    /// What is mixed along a ray before `limit`, from the eye on, with its alpha.
+    fn panes(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Vec<(Met, f64)> {
+        let found = RefCell::new(Vec::new());
+        self.tree.first(origin_ned_m, direction_ned, limit, |i, limit| -> Option<(f64, ())> {
+            let i = i as usize;
+            let mesh = self.scene.meshes.get(i).filter(|mesh| mesh.material.blends)?;
+            let shape_from_ned = self.shape_from_ned[i];
+            let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
+            self.shapes[i].first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
+                let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
+                let points = corners.map(|corner| mesh.position_ned_m(corner));
+                let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
+                let alpha = mesh.alpha_at(corners, weights).clamp(0.0, 1.0);
+                if alpha > 0.0 && mesh.faces(corners, direction_ned) {
+                    found.borrow_mut().push((self.met(i, t, corners, weights, direction_ned), alpha));
+                }
+                None
+            })
+        });
+        let mut found = found.into_inner();
+        found.sort_by(|(a, _), (b, _)| a.depth_m.total_cmp(&b.depth_m));
+        found
     }
 
     /// Place in the picture on what a ray met, texels.
@@ -157,7 +221,6 @@ mod tests {
     use glam::{DQuat, EulerRot};
 
     use super::*;
-    use crate::scene::{Encoding, Mesh, Texture};
 
     /// Waves of 30 m under three pictures at different heights, one of them tilted.
     fn scene() -> Scene {

@@ -15,6 +15,8 @@ use crate::scene::{Light, Mesh, Shape};
 const LEAF: usize = 4;
 /// Boxes waiting while the tree is walked: its depth is at most log2 of the number of triangles.
 const STACK: usize = 64;
+/// Relative distance of two triangles at an edge that they share: what rounds.
+const SAME_PLACE: f64 = 1e-12;
 
 #[derive(Clone, Copy, Debug)]
 struct Triangle {
@@ -32,8 +34,19 @@ struct Cover {
     one_sided: bool,
     /// The picture and the alpha below which there is a hole.
     holes: Option<(Coat, f64)>,
+    /// Whether it is mixed with what is behind it.
+    blends: bool,
     /// By corner of the shape, its outward normal as it stands; none where no light falls.
     normals: Vec<DVec3>,
+}
+
+/// Where a ray passes through a surface that is mixed with what is behind it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layer {
+    pub hit: Hit,
+    pub alpha: f64,
+    /// Exactly between two triangles.
+    on_edge: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +90,8 @@ impl Meshes {
         let cover = |mesh: &Mesh| Cover {
             shape: mesh.shape.clone(),
             one_sided: mesh.material.one_sided,
-            holes: mesh.material.cutoff.map(|cutoff| (Coat::new(&mesh.material), f64::from(cutoff))),
+            holes: has_alpha(mesh).then(|| (Coat::new(&mesh.material), f64::from(mesh.material.cutoff.unwrap_or(0.0)))),
+            blends: mesh.material.blends,
             normals: if light.is_some() { standing_normals(mesh) } else { Vec::new() },
         };
         let covers = meshes.iter().map(cover).collect();
@@ -89,16 +103,65 @@ impl Meshes {
     }
 
     /// The first meeting before `limit`.
-    pub(super) fn first(&self, ray: &Ray, mut limit: f64) -> Option<Hit> {
+    pub(super) fn first(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        self.first_of(ray, limit, |_| true)
+    }
+
+    /// The same, of what lets no light through.
+    pub(super) fn first_solid(&self, ray: &Ray, limit: f64) -> Option<Hit> {
+        self.first_of(ray, limit, |cover| !cover.blends)
+    }
+
+    fn first_of(&self, ray: &Ray, limit: f64, counts: impl Fn(&Cover) -> bool) -> Option<Hit> {
         let mut best = None;
+        self.walk(ray, limit, |triangle, limit| {
+            let cover = self.cover(triangle);
+            let (t, weights) = meet(triangle.corners.map(|corner| ray.see(corner)), limit).filter(|_| counts(cover))?;
+            let (hit, alpha) = self.hit(ray, triangle, t, weights)?;
+            if cover.holes.as_ref().is_some_and(|(_, cutoff)| alpha < *cutoff) {
+                return None;
+            }
+            best = Some(hit);
+            Some(t)
+        });
+        best
+    }
+
+    /// All that is met before `limit` of what is mixed with what is behind it, in no order.
+    pub(super) fn layers(&self, ray: &Ray, limit: f64) -> Vec<Layer> {
+        let mut layers: Vec<Layer> = Vec::new();
+        self.walk(ray, limit, |triangle, limit| {
+            if self.cover(triangle).blends {
+                let (t, weights) = meet(triangle.corners.map(|corner| ray.see(corner)), limit)?;
+                let (hit, alpha) = self.hit(ray, triangle, t, weights)?;
+                // Two triangles that share an edge are one surface there.
+                let on_edge = weights.contains(&0.0);
+                let again = |layer: &Layer| {
+                    on_edge && layer.on_edge && layer.hit.surface == hit.surface && (layer.hit.depth_m - t).abs() <= SAME_PLACE * t
+                };
+                if !layers.iter().any(again) {
+                    layers.push(Layer { hit, alpha, on_edge });
+                }
+            }
+            None
+        });
+        layers
+    }
+
+    fn cover(&self, triangle: &Triangle) -> &Cover {
+        &self.covers[triangle.surface as usize - 1]
+    }
+
+    /// Shows all triangles that may be met before a limit, which `meet` brings nearer by what it gives.
+    fn walk(&self, ray: &Ray, mut limit: f64, mut meet: impl FnMut(&Triangle, f64) -> Option<f64>) {
         let mut stack = [(0.0_f64, 0_u32); STACK];
         let mut waiting = 0;
-        let root = self.nodes.first()?;
+        let Some(root) = self.nodes.first() else { return };
         let mut current = ray.enter(root.bounds.low, root.bounds.high, limit).map(|_| 0_u32);
         loop {
             let Some(index) = current.take() else {
                 if waiting == 0 {
-                    return best;
+                    return;
                 }
                 waiting -= 1;
                 let (enter, index) = stack[waiting];
@@ -108,11 +171,7 @@ impl Meshes {
             let node = &self.nodes[index as usize];
             if node.count > 0 {
                 for triangle in &self.triangles[node.next as usize..(node.next + node.count) as usize] {
-                    let met = meet(triangle.corners.map(|corner| ray.see(corner)), limit);
-                    if let Some(hit) = met.and_then(|(t, weights)| self.hit(ray, triangle, t, weights)) {
-                        limit = hit.depth_m;
-                        best = Some(hit);
-                    }
+                    limit = meet(triangle, limit).unwrap_or(limit);
                 }
                 continue;
             }
@@ -136,9 +195,9 @@ impl Meshes {
 }
 
 impl Meshes {
-    /// `None` where the ray passes a hole, or comes from the side that is not there.
-    fn hit(&self, ray: &Ray, triangle: &Triangle, t: f64, weights: [f64; 3]) -> Option<Hit> {
-        let cover = &self.covers[triangle.surface as usize - 1];
+    /// What is there, and its alpha; `None` for a ray from the side that is not there.
+    fn hit(&self, ray: &Ray, triangle: &Triangle, t: f64, weights: [f64; 3]) -> Option<(Hit, f64)> {
+        let cover = self.cover(triangle);
         let [a, b, c] = triangle.corners;
         if cover.one_sided && (b - a).cross(c - a).dot(ray.direction) >= 0.0 {
             return None;
@@ -147,12 +206,14 @@ impl Meshes {
         let [red, green, blue, alpha]: [f64; 4] =
             [0, 1, 2, 3].map(|k: usize| (0..3).map(|corner| weights[corner] * f64::from(of[corner].tint[k])).sum());
         let hit = ray_hit(ray, t, weights, of.map(|vertex| vertex.uv), triangle.surface);
-        if cover.holes.as_ref().is_some_and(|(coat, cutoff)| coat.alpha_at(hit.texture_uv) * alpha < *cutoff) {
-            return None;
-        }
+        let alpha = cover.holes.as_ref().map_or(1.0, |(coat, _)| coat.alpha_at(hit.texture_uv) * alpha);
         let lit = self.light.map_or(1.0, |light| lit(&light, cover, triangle, weights, ray.direction));
-        Some(Hit { tint: [red, green, blue].map(|part| part * lit), ..hit })
+        Some((Hit { tint: [red, green, blue].map(|part| part * lit), ..hit }, alpha))
     }
+}
+
+fn has_alpha(mesh: &Mesh) -> bool {
+    mesh.material.blends || mesh.material.cutoff.is_some()
 }
 
 /// What of its light comes back from a place of a triangle, towards where the ray comes from: the sun's by the cosine of its angle, the sky's by

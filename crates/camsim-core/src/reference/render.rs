@@ -219,7 +219,7 @@ impl Job<'_> {
                 // At the border of what the lens shows, the part of the area that it does show.
                 let Some(uv) = self.view.ray([x, y], place - 0.5) else { continue };
                 let pose = instants.pose(x, i);
-                part += self.oracle.color(uv, self.view.hit(&pose, uv).as_ref());
+                part += self.oracle.light(&pose, uv);
                 count += 1;
             }
             if count == 0 {

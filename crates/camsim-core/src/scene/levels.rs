@@ -3,7 +3,10 @@
 //! A level is within its error of the full shape, and the shape of it, as surfaces with their colours and texture coordinates
 //! (`levels/space.rs`). Seen from a distance that is a number of pixels.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -104,14 +107,20 @@ pub struct SceneLevels {
 }
 
 impl SceneLevels {
-    /// Simplifies each shape of a scene once.
+    /// Simplifies each shape of a scene once. What is mixed with what is behind it stays whole: how many layers there are, one behind the other, no
+    /// distance between surfaces bounds.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let mut shapes: HashMap<usize, &Arc<Shape>> = HashMap::new();
+        let blended: HashSet<usize> =
+            scene.meshes.iter().filter(|mesh| mesh.material.blends).map(|mesh| Arc::as_ptr(&mesh.shape) as usize).collect();
         scene.meshes.iter().for_each(|mesh| {
             shapes.insert(Arc::as_ptr(&mesh.shape) as usize, &mesh.shape);
         });
-        Self { of: shapes.into_par_iter().map(|(key, shape)| (key, Arc::new(ShapeLevels::new(shape)))).collect() }
+        let levels = |(key, shape): (usize, &Arc<Shape>)| {
+            (key, Arc::new(if blended.contains(&key) { ShapeLevels::full(shape) } else { ShapeLevels::new(shape) }))
+        };
+        Self { of: shapes.into_par_iter().map(levels).collect() }
     }
 
     /// Of a shape of the scene.

@@ -70,6 +70,8 @@ pub struct Material {
     pub emissive: [f32; 3],
     /// Where the picture's alpha, times the tint's, is below this there is no surface. The picture at full size counts, bilinear.
     pub cutoff: Option<f32>,
+    /// Whether its colour is mixed with what is behind it, by alpha, wherever there is any: the cut-off then says where it has depth.
+    pub blends: bool,
     /// Whether only the side is there from which the triangles turn anticlockwise.
     pub one_sided: bool,
 }
@@ -77,14 +79,14 @@ pub struct Material {
 impl Material {
     /// A picture, seen from both sides, without holes.
     pub fn picture(texture: Arc<Texture>, wrap: Wrap) -> Self {
-        Self { texture, wrap: [wrap; 2], nearest: false, emissive: [0.0; 3], cutoff: None, one_sided: false }
+        Self { texture, wrap: [wrap; 2], nearest: false, emissive: [0.0; 3], cutoff: None, blends: false, one_sided: false }
     }
 
     /// Whether two materials share their texture and are otherwise equal.
     pub fn is(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.texture, &other.texture)
             && (self.wrap, self.nearest, self.cutoff, self.one_sided) == (other.wrap, other.nearest, other.cutoff, other.one_sided)
-            && self.emissive == other.emissive
+            && (self.emissive, self.blends) == (other.emissive, other.blends)
     }
 
     /// Alpha at a place of the picture, in f64: what the cut-off is compared with, but for the tint.
@@ -159,16 +161,19 @@ impl Mesh {
 
     /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right side, and no hole.
     pub(crate) fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
-        if self.material.one_sided {
-            let [a, b, c] = corners.map(|v| self.position_ned_m(v));
-            if (b - a).cross(c - a).dot(direction_ned) >= 0.0 {
-                return false;
-            }
-        }
-        self.material.cutoff.is_none_or(|cutoff| {
-            let (uv, tint) = (self.uv_at(corners, weights), self.tint_at(corners, weights));
-            self.material.alpha_at(uv) * tint[3] >= f64::from(cutoff)
-        })
+        self.faces(corners, direction_ned)
+            && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
+    }
+
+    /// Whether a triangle is there for what looks along a direction.
+    pub(crate) fn faces(&self, corners: [u32; 3], direction_ned: DVec3) -> bool {
+        let [a, b, c] = corners.map(|v| self.position_ned_m(v));
+        !self.material.one_sided || (b - a).cross(c - a).dot(direction_ned) < 0.0
+    }
+
+    /// Alpha between three corners.
+    pub(crate) fn alpha_at(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
+        self.material.alpha_at(self.uv_at(corners, weights)) * self.tint_at(corners, weights)[3]
     }
 
     /// Texture coordinates between three corners.

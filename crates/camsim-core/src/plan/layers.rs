@@ -1,0 +1,85 @@
+//! What it costs that a pixel of the ideal frame has one depth where light of several surfaces is mixed.
+//!
+//! The ideal frame mixes colours as its own camera sees them. A pixel of another line or instant looks where the surface of its depth is, and there the
+//! other layers are not quite those that its own ray passes: they are displaced by the parallax between them. What that costs is found by doing it: at
+//! each probe the light of its own ray beside the light of the ideal camera's ray to the same point.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{LensReach, probes::Probe, surfaces::Surfaces};
+use crate::{mount::CameraPath, pose::CameraPose, shutter::Shutter};
+
+/// Times what is expected: of a few hundred probes few may see a pane.
+const SAFETY: f64 = 1.2;
+/// Phases of the exposure that the probes take turns in.
+const PHASES: [f64; 3] = [0.0, -0.5, 0.5];
+/// Depth of the point that the ideal camera meets, relative, within which it is the same: beyond that it is hidden, and counted as a hole.
+const SAME_POINT: f64 = 1e-3;
+
+/// Light that is mixed, and what its one depth costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Layers {
+    /// Share of the pixels in which it is.
+    pub share: f64,
+    /// RMS error over the picture, 1/255 of the linear range.
+    pub error_dn: f64,
+}
+
+/// A frame in which it is looked for.
+pub(super) struct Search<'a> {
+    pub reach: &'a LensReach,
+    pub surfaces: &'a Surfaces,
+    pub path: &'a CameraPath,
+    pub shutter: &'a Shutter,
+    pub stamp_s: f64,
+    /// The ideal frame's camera.
+    pub key_pose: &'a CameraPose,
+    /// Of the linear range for a pixel, for each unit of light that arrives.
+    pub gain: &'a (dyn Fn([u32; 2]) -> f64 + Sync),
+}
+
+impl Search<'_> {
+    /// `None` where nothing in the scene is mixed.
+    pub fn layers(&self) -> Option<Layers> {
+        if !self.surfaces.blends() {
+            return None;
+        }
+        let probes = &self.reach.probes;
+        // Summed in their order: a plan does not depend on how threads share work.
+        let squares: Vec<Option<f64>> = probes.par_iter().enumerate().map(|(i, probe)| self.square(i, probe)).collect();
+        let count = probes.len().max(1) as f64;
+        let mixed = squares.iter().flatten();
+        let share = mixed.clone().count() as f64 / count;
+        Some(Layers { share, error_dn: SAFETY * 255.0 * (mixed.sum::<f64>() / count).sqrt() })
+    }
+
+    /// Squared error at a probe, of the linear range, mean over the channels; `None` where light is of one surface.
+    fn square(&self, i: usize, probe: &Probe) -> Option<f64> {
+        let phase = PHASES[i % PHASES.len()];
+        let [x, y] = probe.pixel;
+        let t_s = self.stamp_s + self.shutter.dt_pixel_s(x, y) + phase * self.shutter.exposure_s();
+        let pose = self.path.pose(t_s);
+        let way_ned = pose.ned_from_camera * probe.uv.extend(1.0);
+        let met = self.surfaces.meet(pose.position_ned_m, way_ned);
+        let range_per_depth = probe.uv.extend(1.0).length();
+        let own = self.surfaces.light(pose.position_ned_m, way_ned, met.as_ref(), range_per_depth);
+        // The point in the key camera, or the direction to what is infinitely far.
+        let to_point_ned = met.map_or(way_ned, |met| pose.position_ned_m + met.depth_m * way_ned - self.key_pose.position_ned_m);
+        let in_key = self.key_pose.ned_from_camera.conjugate() * to_point_ned;
+        let depth_m = in_key.z;
+        let key_way_ned = to_point_ned / depth_m;
+        let found = self.surfaces.meet(self.key_pose.position_ned_m, key_way_ned);
+        let seen = self.surfaces.light(self.key_pose.position_ned_m, key_way_ned, found.as_ref(), (in_key / depth_m).length());
+        if own.panes.is_empty() && seen.panes.is_empty() {
+            return None;
+        }
+        let is_same = match (met, found) {
+            (Some(_), Some(found)) => (found.depth_m - depth_m).abs() <= SAME_POINT * depth_m,
+            (None, None) => depth_m > 0.0,
+            _ => false,
+        };
+        let square = (self.gain)(probe.pixel).powi(2) * (own.color - seen.color).length_squared() / 3.0;
+        Some(if is_same { square } else { 0.0 })
+    }
+}
