@@ -25,6 +25,5 @@ fn base_from_shape(instance: u32, position_m: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot(placement.x, at), dot(placement.y, at), dot(placement.z, at));
 }
 
-fn mesh_color(uv: vec2<f32>, tint: vec4<f32>, in_camera_m: vec3<f32>) -> vec4<f32> {
-    return in_fog(picture_at(uv) * tint.rgb + material.emissive_cutoff.rgb, in_camera_m);
-}
+// What arrives from it: the `mesh_color` slot.
+#import <slot:mesh_color>

@@ -327,6 +327,9 @@ impl Planner {
                 skip("depth read by the reverse pipeline", "no stage of this frame uses it");
             }
         }
+        if !self.surfaces.blends() {
+            skip("mixing of blended surfaces", "no surface of the scene is blended");
+        }
         if self.sequence.scene.fog_visibility_m.is_none() {
             skip("fog", "scene.fog_visibility_m is not set");
         }

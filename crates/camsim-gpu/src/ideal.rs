@@ -3,7 +3,7 @@
 use std::{collections::HashMap, ops::Range};
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX, SurfaceReads},
+    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
     scenario::Preset,
     scene::{LevelTolerance, LodSelection, PlacedMesh, Scene},
@@ -14,26 +14,31 @@ use glam::{DMat3, DVec3};
 use crate::{
     context::GpuContext,
     engine::RenderErrorBase,
-    layout::{IdealCamera, MeshPlacement, MeshVertexData},
+    layout::{IdealCamera, MeshPlacement},
     recorder::Recorder,
-    shaders::{ComposeError, Slot},
-    upload::{MeshBatch, MeshKind, SceneBuffers},
+    shaders::ComposeError,
+    upload::SceneBuffers,
 };
 
 mod drawing;
 mod fine;
+mod layers;
 mod marks;
 mod near_marks;
+mod pipelines;
 mod surfaces;
 
-use drawing::{Drawing, pipeline};
 pub(crate) use fine::whole;
 pub use fine::{FINE_SAMPLES, FineTarget};
 use fine::{TILE_PX, scale_of, texture};
+use layers::Ordered;
 use marks::MarksPass;
 #[cfg(test)]
 pub(crate) use marks::spread_slot;
 use near_marks::NearMarksPass;
+#[cfg(test)]
+pub(crate) use pipelines::{mesh_slots, picture_slot, reads_slot};
+use pipelines::{SurfaceKey, SurfacePipelines};
 use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
@@ -98,21 +103,6 @@ impl IdealTarget {
     }
 }
 
-/// What fills the surfaces' slot.
-pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
-    let file = match reads {
-        SurfaceReads::Two => "ideal/reads/two.wgsl",
-        SurfaceReads::Four => "ideal/reads/four.wgsl",
-        SurfaceReads::Grid => "ideal/reads/grid.wgsl",
-    };
-    ("reads", file)
-}
-
-/// What fills the slot of the surface's picture.
-pub(crate) fn picture_slot(has_tiles: bool) -> Slot {
-    ("picture", if has_tiles { "ideal/picture/tiles.wgsl" } else { "ideal/picture/whole.wgsl" })
-}
-
 /// Format that surfaces are drawn to with one sample a pixel.
 fn color_format(preset: Preset) -> wgpu::TextureFormat {
     match preset {
@@ -150,25 +140,6 @@ struct SilhouettePasses {
     near_marks: NearMarksPass,
 }
 
-/// Which pipelines draw surfaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum SurfaceKey {
-    /// Colour and depth, one sample a pixel.
-    Plain(SurfaceReads),
-    /// Depth, several samples a pixel.
-    FineDepth,
-    /// Colour and depth, several samples a pixel.
-    Fine(SurfaceReads),
-}
-
-/// What draws surfaces to a target of a given number of samples.
-#[derive(Debug)]
-struct SurfacePipelines {
-    terrain: wgpu::RenderPipeline,
-    /// Those that the scene needs.
-    meshes: HashMap<MeshKind, wgpu::RenderPipeline>,
-}
-
 /// Buffers of one ideal frame of a frame in flight, and their bind groups.
 #[derive(Debug)]
 pub struct IdealSlot {
@@ -181,6 +152,8 @@ pub struct IdealSlot {
     /// By batch: what is on it, and which placements are drawn with each of its levels of detail.
     mesh_groups: Vec<wgpu::BindGroup>,
     drawn: Vec<Vec<Range<u32>>>,
+    /// What is mixed, from behind to the front; none where nothing in the scene is.
+    layers: Option<Ordered>,
 }
 
 impl IdealSlot {
@@ -226,40 +199,6 @@ impl IdealPass {
         })
     }
 
-    fn surface_pipelines(&self, gpu: &GpuContext, key: SurfaceKey, batches: &[MeshBatch]) -> Result<SurfacePipelines, ComposeError> {
-        let mesh_vertices = wgpu::VertexBufferLayout {
-            array_stride: size_of::<MeshVertexData>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x2, 2 => Unorm16x4],
-        };
-        let mesh_normals = wgpu::VertexBufferLayout {
-            array_stride: size_of::<[f32; 3]>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &wgpu::vertex_attr_array![3 => Float32x3],
-        };
-        let (reads, samples, format) = match key {
-            SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
-            // Nothing is read for depth, but for holes.
-            SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
-            SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
-        };
-        let slots = |has_tiles| [reads_slot(reads), picture_slot(has_tiles)];
-        let ground = [&self.camera_layout, &self.terrain_layout];
-        let on_ground = Drawing { samples, color: format, ..Drawing::default() };
-        let terrain = pipeline(gpu, "ideal/terrain.wgsl", &slots(self.has_tiles), &ground, &[], on_ground)?;
-        let layouts = [&self.camera_layout, &self.mesh_layout, &self.placement_layout];
-        let mut meshes = HashMap::new();
-        for MeshBatch { kind, .. } in batches {
-            if !meshes.contains_key(kind) {
-                let drawing = Drawing { one_sided: kind.one_sided, holes: kind.holes, ..on_ground };
-                let vertices = [Some(mesh_vertices.clone()), Some(mesh_normals.clone())];
-                let vertices = if kind.lit { &vertices[..] } else { &vertices[..1] };
-                meshes.insert(*kind, pipeline(gpu, kind.shader(), &slots(false), &layouts, vertices, drawing)?);
-            }
-        }
-        Ok(SurfacePipelines { terrain, meshes })
-    }
-
     /// Buffers for one ideal frame of this scene.
     #[must_use]
     pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
@@ -291,8 +230,9 @@ impl IdealPass {
             )
         });
         let mesh_groups = mesh_groups.collect();
+        let layers = buffers.batches.iter().any(|batch| batch.kind.blends).then(|| Ordered::new(gpu));
         let placement_group = group(&self.placement_layout, &[entry(0, placements.as_entire_binding())]);
-        IdealSlot { camera, terrain, placements, camera_group, placement_group, mesh_groups, drawn: Vec::new() }
+        IdealSlot { camera, terrain, placements, camera_group, placement_group, mesh_groups, drawn: Vec::new(), layers }
     }
 
     /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
@@ -337,7 +277,10 @@ impl IdealPass {
                 lod = mesh.lod;
             }
             index_counts.push(indices);
-            place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
+            let seen = place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
+            if let Some(layers) = &mut slot.layers {
+                layers.order(gpu, recorder, buffers, &slot.drawn, &seen, &key.pose, tolerance.tangents)?;
+            }
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
             }
@@ -389,7 +332,12 @@ impl IdealPass {
             pass.set_scissor_rect(0, first_row, width, height);
             pass.set_bind_group(0, &slot.camera_group, &[]);
             draw_terrain(pass, pipelines, slot, triangles(k));
-            draw_meshes(pass, pipelines, slot, buffers);
+            draw_meshes(pass, pipelines, slot, buffers, false);
+            if let Some(layers) = &slot.layers {
+                layers.draw(pass, pipelines, slot, buffers);
+                // Their depth last: what is mixed hides nothing that is mixed.
+                draw_meshes(pass, pipelines, slot, buffers, true);
+            }
         }
     }
 }

@@ -236,7 +236,7 @@ mod tests {
                 pad2,
             ]
         );
-        let slots = [crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(false)];
+        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, false);
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);

@@ -56,6 +56,8 @@ pub struct MeshBatch {
     pub ranges: Vec<Range<u32>>,
     /// How far each level is from the full shape.
     pub levels: Arc<ShapeLevels>,
+    /// The shape, for the order of what is mixed.
+    pub shape: Arc<Shape>,
     /// Picture.
     pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
@@ -79,12 +81,14 @@ pub struct MeshKind {
     pub holes: bool,
     /// Light falls on it.
     pub lit: bool,
+    /// Mixed with what is behind it.
+    pub blends: bool,
 }
 
 impl MeshKind {
-    /// What draws it, below `shaders/`.
+    /// What draws its colour, below `shaders/`: where it is mixed alpha makes no hole.
     pub(crate) fn shader(self) -> &'static str {
-        match (self.holes, self.lit) {
+        match (self.holes && !self.blends, self.lit) {
             (false, false) => "ideal/mesh.wgsl",
             (false, true) => "ideal/mesh_lit.wgsl",
             (true, false) => "ideal/mesh_holes.wgsl",
@@ -227,10 +231,11 @@ fn upload_batch(
         normals: light.map(|_| buffer("camsim.mesh.normals", bytemuck::cast_slice(&shape.normals), wgpu::BufferUsages::VERTEX)),
         ranges,
         levels,
+        shape: shape.clone(),
         texture,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
-        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some(), lit: light.is_some() },
+        kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some(), lit: light.is_some(), blends: material.blends },
         members,
     }
 }

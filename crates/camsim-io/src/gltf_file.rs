@@ -227,6 +227,7 @@ impl Reader<'_> {
                 self.shapes.insert(key, shape.clone());
             }
             if !shape.indices.is_empty() {
+                let material = self.materials.on(&shape, material);
                 self.parts.push(Part { shape, material, model_from_shape });
             }
         }

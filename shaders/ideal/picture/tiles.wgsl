@@ -20,6 +20,9 @@ struct TileTable {
 
 @group(1) @binding(3) var<storage, read> tile_table: TileTable;
 
+// What is read of it.
+alias Texel = vec3<f32>;
+
 // Texels.
 fn picture_size() -> vec2<f32> {
     return vec2<f32>(tile_table.size);

@@ -4,7 +4,7 @@
 // Longer by this than wide (at least a texel), and one read across is enough.
 const IN_A_ROW: f32 = 1.6;
 
-fn picture_at(uv: vec2<f32>) -> vec3<f32> {
+fn picture_at(uv: vec2<f32>) -> Texel {
     let pixel = pixel_at(uv);
     let square = pixel.longer < IN_A_ROW * max(pixel.shorter, 1.0);
     let version = version_for(select(max(0.25 * pixel.longer, pixel.shorter), 0.5 * pixel.longer, square));

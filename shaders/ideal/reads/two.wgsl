@@ -1,5 +1,5 @@
 // Two reads along the longer axis. No loop: llvmpipe pays as much for one as for a read.
-fn picture_at(uv: vec2<f32>) -> vec3<f32> {
+fn picture_at(uv: vec2<f32>) -> Texel {
     let pixel = pixel_at(uv);
     let version = version_for(max(0.5 * pixel.longer, pixel.shorter));
     // +-x has the variance x^2, a mean over the length l has l^2 / 12.

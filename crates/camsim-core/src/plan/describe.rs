@@ -94,7 +94,8 @@ impl FramePlan {
             passes.push("lens_inverse: lens map, kept while the lens holds".to_owned());
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
-        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}{shared}"));
+        let mixed = if self.predicted.layers.is_some() { ", blended surfaces last and from behind to the front" } else { "" };
+        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}{mixed}{shared}"));
         if let EdgeStage::Supersampled { scale, thin, .. } = self.edges {
             let marks = format!("{width}x{height} px, marked where several surfaces are seen");
             let color = if scale > 1 { "rgba16float + " } else { "" };

@@ -8,5 +8,6 @@ mod convergence;
 mod fixtures;
 mod holes;
 mod hostile;
+mod layers;
 mod measuring;
 mod planted_faults;

@@ -8,7 +8,7 @@ use camsim_core::{
 };
 use glam::DVec3;
 
-use super::{IdealSlot, SurfacePipelines, near_marks::Kept};
+use super::{IdealSlot, near_marks::Kept, pipelines::SurfacePipelines};
 use crate::{
     context::{GpuContext, GpuError},
     layout::MeshPlacement,
@@ -20,7 +20,7 @@ use crate::{
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
 
-/// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how much detail.
+/// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how much detail; gives whose place each is.
 pub(super) fn place_meshes(
     recorder: &mut Recorder<'_>,
     slot: &mut IdealSlot,
@@ -28,7 +28,7 @@ pub(super) fn place_meshes(
     pose: &CameraPose,
     tolerance: &LevelTolerance,
     base_ned_m: DVec3,
-) {
+) -> Vec<u32> {
     let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
     let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
     let places: Vec<_> = buffers.batches.iter().map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end)).collect();
@@ -48,6 +48,7 @@ pub(super) fn place_meshes(
     if !placements.is_empty() {
         recorder.write(&slot.placements, 0, bytemuck::cast_slice(&placements));
     }
+    seen
 }
 
 /// Sorts those of a batch that are seen by their level of detail; gives the range of each level.
@@ -69,9 +70,17 @@ fn by_level(
     (0..batch.ranges.len()).map(|level| place(level)..place(level + 1)).collect()
 }
 
-pub(super) fn draw_meshes(pass: &mut wgpu::RenderPass<'_>, pipelines: &SurfacePipelines, slot: &IdealSlot, buffers: &SceneBuffers) {
+/// Draws the meshes, or the depth of those that are mixed with what is behind them.
+pub(super) fn draw_meshes(
+    pass: &mut wgpu::RenderPass<'_>,
+    pipelines: &SurfacePipelines,
+    slot: &IdealSlot,
+    buffers: &SceneBuffers,
+    blended: bool,
+) {
     let mut last = None;
-    for ((batch, group), drawn) in buffers.batches.iter().zip(&slot.mesh_groups).zip(&slot.drawn) {
+    let batches = buffers.batches.iter().zip(&slot.mesh_groups).zip(&slot.drawn);
+    for ((batch, group), drawn) in batches.filter(|((batch, _), _)| batch.kind.blends == blended) {
         let some = drawn.iter().any(|instances| !instances.is_empty());
         let Some(pipeline) = pipelines.meshes.get(&batch.kind).filter(|_| some) else { continue };
         if last != Some(batch.kind) {
@@ -218,7 +227,7 @@ fn vertex_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
     create(gpu, "camsim.ideal.vertices", bytes, wgpu::BufferUsages::STORAGE)
 }
 
-fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
+pub(super) fn index_buffer(gpu: &GpuContext, bytes: u64) -> wgpu::Buffer {
     create(gpu, "camsim.ideal.indices", bytes, wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE)
 }
 

@@ -348,10 +348,14 @@ mod tests {
             ("ideal/mesh_holes.wgsl", false),
             ("ideal/mesh_holes_lit.wgsl", false),
         ];
-        let surfaces = surfaces.into_iter().flat_map(|(file, tiles)| {
+        let mixed = [("ideal/mesh.wgsl", true), ("ideal/mesh_lit.wgsl", true)];
+        let surfaces = surfaces.into_iter().chain(mixed).flat_map(|(file, other)| {
             SurfaceReads::ALL.map(|reads| {
-                let slots = [crate::ideal::reads_slot(reads), crate::ideal::picture_slot(tiles)];
-                (format!("{file} {reads:?} {tiles}"), shaders::compose(file, &slots).unwrap())
+                // Of the ground in tiles, of meshes mixed.
+                let on_ground = [crate::ideal::reads_slot(reads), crate::ideal::picture_slot(other)];
+                let on_mesh = crate::ideal::mesh_slots(reads, other);
+                let slots = if file == "ideal/terrain.wgsl" { &on_ground[..] } else { &on_mesh };
+                (format!("{file} {reads:?} {other}"), shaders::compose(file, slots).unwrap())
             })
         });
         let marks = [false, true].map(|thin| {

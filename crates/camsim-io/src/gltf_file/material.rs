@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use camsim_core::scene::{Encoding, Material, Texture, Wrap};
+use camsim_core::scene::{Encoding, Material, Shape, Texture, Wrap};
 use gltf::{
     material::AlphaMode,
     texture::{Info, MagFilter, WrappingMode},
@@ -10,7 +10,7 @@ use gltf::{
 
 use super::{GltfError, emitted, source::Source};
 
-/// Where blended surfaces are cut, as blending is not there.
+/// From this alpha on a blended surface has depth: a pixel has one, that of the surface most of its light is of.
 const BLEND_CUTOFF: f32 = 0.5;
 
 /// How a primitive's corners meet its picture.
@@ -42,6 +42,8 @@ pub(super) struct Materials<'a> {
     white: Arc<Texture>,
     /// By image, and whether its alpha counts.
     textures: HashMap<(usize, bool), Arc<Texture>>,
+    /// Of pictures with alpha that were asked, whether any of it is below 1.
+    clear: HashMap<*const Texture, bool>,
     known: HashMap<Option<usize>, (Material, UvRule)>,
     pub notes: Vec<String>,
 }
@@ -49,7 +51,7 @@ pub(super) struct Materials<'a> {
 impl<'a> Materials<'a> {
     pub fn new(source: &'a Source) -> Self {
         let white = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-        Self { source, white, textures: HashMap::new(), known: HashMap::new(), notes: Vec::new() }
+        Self { source, white, textures: HashMap::new(), clear: HashMap::new(), known: HashMap::new(), notes: Vec::new() }
     }
 
     pub fn of(&mut self, material: &gltf::Material<'_>) -> Result<(Material, UvRule), GltfError> {
@@ -59,7 +61,9 @@ impl<'a> Materials<'a> {
         let base = material.pbr_metallic_roughness();
         let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
         let emits = emitted.iter().any(|&part| part > 0.0);
-        let black = factor[..3].iter().all(|&part| part == 0.0);
+        // Alpha is the base colour's, black or not.
+        let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
+        let black = factor[..3].iter().all(|&part| part == 0.0) && !(has_alpha && base.base_color_texture().is_some());
         let mut rule = UvRule {
             set: 0,
             offset: [0.0; 2],
@@ -75,7 +79,7 @@ impl<'a> Materials<'a> {
         let info = match (base.base_color_texture(), material.emissive_texture()) {
             // Nothing but what is emitted.
             (_, Some(info)) if emits && black => {
-                rule.factor = [emitted[0], emitted[1], emitted[2], 1.0];
+                rule.factor = [emitted[0], emitted[1], emitted[2], factor[3]];
                 rule.vertex_colors = false;
                 rule.takes_light = false;
                 Some(info)
@@ -92,7 +96,7 @@ impl<'a> Materials<'a> {
             }
         };
         let with_light = match &on_top {
-            Some(light) => self.with_light(info.as_ref(), light, material.alpha_mode() != AlphaMode::Opaque, emitted, &mut rule)?,
+            Some(light) => self.with_light(info.as_ref(), light, has_alpha, emitted, &mut rule)?,
             None => None,
         };
         let (texture, wrap, nearest) = match (with_light, &info) {
@@ -102,19 +106,28 @@ impl<'a> Materials<'a> {
                 rule.scale = [0.0; 2];
                 (self.white.clone(), [Wrap::Repeat; 2], false)
             }
-            (None, Some(info)) => self.textured(info, material.alpha_mode() != AlphaMode::Opaque, &mut rule)?,
+            // Of a picture of emitted light alpha does not count.
+            (None, Some(info)) => self.textured(info, has_alpha && !(emits && black), &mut rule)?,
         };
         let cutoff = match material.alpha_mode() {
             AlphaMode::Opaque => None,
             AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
-            AlphaMode::Blend => {
-                self.notes.push("blended surfaces are shown where their alpha is 0.5 or more, and not mixed with what is behind".into());
-                Some(BLEND_CUTOFF)
-            }
+            AlphaMode::Blend => Some(BLEND_CUTOFF),
         };
-        let made = Material { texture, wrap, nearest, emissive, cutoff, one_sided: !material.double_sided() };
+        let blends = material.alpha_mode() == AlphaMode::Blend;
+        let made = Material { texture, wrap, nearest, emissive, cutoff, blends, one_sided: !material.double_sided() };
         self.known.insert(material.index(), (made.clone(), rule));
         Ok((made, rule))
+    }
+
+    /// The material on a shape: what is to be blended and has no alpha below 1 anywhere hides what is behind it, and is drawn as what does.
+    pub fn on(&mut self, shape: &Shape, material: Material) -> Material {
+        let texture = &material.texture;
+        let is_clear = || texture.rgba8.chunks_exact(4).any(|pixel| pixel[3] < 255);
+        let mixes = material.blends
+            && (shape.vertices.iter().any(|vertex| vertex.tint[3] < 1.0)
+                || *self.clear.entry(Arc::as_ptr(texture)).or_insert_with(is_clear));
+        if material.blends && !mixes { Material { blends: false, cutoff: None, ..material } } else { material }
     }
 
     /// The base colour with a picture of emitted light on top; `None`, and a note, where they do not lie on each other texel by texel.

@@ -332,3 +332,36 @@ fn normals_of_real_models_look_outwards_wherever_joints_take_them() {
         assert!(outwards > 0.9 * all, "{name}: {outwards} of {all}");
     }
 }
+
+/// The material of a square; `color` is the first corner's.
+fn material_of(material: &str) -> Material {
+    let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
+    let model = square_with(5, &rest, r#"{ "mesh": 0 }"#, GltfOptions::default()).unwrap();
+    assert!(model.notes.is_empty(), "{:?}", model.notes);
+    model.place(DVec3::ZERO, 0.0, 1.0).next().unwrap().material
+}
+
+#[test]
+fn what_is_blended_is_mixed_where_any_of_it_is_clear() {
+    let of = |mode: &str, alpha: f32| {
+        let factor = format!(r#""pbrMetallicRoughness": {{ "baseColorFactor": [1, 1, 1, {alpha}] }}"#);
+        let found = material_of(&format!(r#"{{ "alphaMode": "{mode}", {factor} }}"#));
+        (found.blends, found.cutoff)
+    };
+    assert_eq!([of("BLEND", 0.5), of("BLEND", 0.999)], [(true, Some(0.5)); 2]);
+    // Nothing is clear: it hides what is behind it.
+    assert_eq!(of("BLEND", 1.0), (false, None));
+    assert_eq!([of("MASK", 0.4), of("MASK", 1.0)], [(false, Some(0.5)); 2]);
+    assert_eq!(of("OPAQUE", 0.4), (false, None));
+}
+
+#[test]
+fn a_real_model_blends_what_it_says() {
+    let Some(data) = data() else { return };
+    let model = read_gltf(&data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"), GltfOptions::default()).unwrap();
+    assert!(model.notes.is_empty(), "{:?}", model.notes);
+    let found: Vec<_> = model.place(DVec3::ZERO, 0.0, 1.0).map(|mesh| (mesh.material.blends, mesh.material.cutoff)).collect();
+    for wanted in [(true, Some(0.5)), (false, None), (false, Some(0.25)), (false, Some(0.5)), (false, Some(0.75))] {
+        assert!(found.contains(&wanted), "{wanted:?} of {found:?}");
+    }
+}
