@@ -36,9 +36,9 @@ use marks::MarksPass;
 #[cfg(test)]
 pub(crate) use marks::spread_slot;
 use near_marks::NearMarksPass;
+use pipelines::{SurfaceKey, SurfacePipelines};
 #[cfg(test)]
 pub(crate) use pipelines::{mesh_slots, picture_slot, reads_slot};
-use pipelines::{SurfaceKey, SurfacePipelines};
 use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.

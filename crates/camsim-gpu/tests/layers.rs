@@ -100,7 +100,9 @@ impl Pictures {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn two_panes_over_a_wall_have_their_closed_form_from_both_sides() {
-    for (heights, alphas, depth_m) in [([20.0, 40.0], [0.3, 0.6], 60.0), ([40.0, 20.0], [0.3, 0.6], 80.0), ([40.0, 20.0], [0.25, 0.4], 100.0)] {
+    for (heights, alphas, depth_m) in
+        [([20.0, 40.0], [0.3, 0.6], 60.0), ([40.0, 20.0], [0.3, 0.6], 80.0), ([40.0, 20.0], [0.25, 0.4], 100.0)]
+    {
         let panes = [pane(RED, alphas[0], heights[0]), pane(BLUE, alphas[1], heights[1])];
         let [a, b] = [(RED, f64::from(alphas[0])), (BLUE, f64::from(alphas[1]))];
         let (front, behind) = if heights[0] > heights[1] { (a, b) } else { (b, a) };

@@ -227,7 +227,10 @@ impl Predicted {
         }
         let silhouettes = self.silhouettes.map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
         let layers = self.layers.map_or_else(String::new, |Layers { share, error_dn }| {
-            format!(", {error_dn:.2} as light mixed of several surfaces ({:.0} % of the picture) moves with the depth of one", 100.0 * share)
+            format!(
+                ", {error_dn:.2} as light mixed of several surfaces ({:.0} % of the picture) moves with the depth of one",
+                100.0 * share
+            )
         });
         writeln!(
             f,

@@ -112,13 +112,7 @@ fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
 
 /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
 /// that these are for what the finest ideal frame does not do.
-fn with_rays(
-    prospect: &Prospect<'_>,
-    task: &Task<'_>,
-    outlook: &Outlook,
-    layers_dn: f64,
-    most_fine: &dyn Fn(f64) -> u32,
-) -> (Choice, u32) {
+fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers_dn: f64, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
     let choose = |fine: u32| {
         let may = |scale: f64| fine <= most_fine(scale) && (fine == 1 || is_usual(scale, task));
         let choice = prospect.choose(task, &|scale| may(scale).then(|| outlook.with_rays(scale, fine).error_dn.hypot(layers_dn)));

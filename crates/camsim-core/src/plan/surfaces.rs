@@ -7,7 +7,10 @@ use glam::{DMat3, DVec2, DVec3};
 use super::NEAR_M;
 use crate::{
     pose::CameraPose,
-    scene::{Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, box_tree::BoxTree, terrain::Frustum, terrain::intersect_triangle},
+    scene::{
+        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, Wrap, box_tree::BoxTree, terrain::Frustum,
+        terrain::intersect_triangle,
+    },
 };
 
 /// Visibility is the distance at which 2 % of a contrast is left, whose logarithm is -3.912.
@@ -135,8 +138,8 @@ impl Surfaces {
         }
         let solid = self.meet_of(origin_ned_m, direction_ned, |mesh| !mesh.material.blends);
         let panes = self.panes(origin_ned_m, direction_ned, solid.map_or(f64::INFINITY, |met| met.depth_m));
-        let behind = self.color(solid.as_ref(), range_per_depth);
-        let over = |behind: DVec3, (met, alpha): &(Met, f64)| behind.lerp(self.color(Some(met), range_per_depth), *alpha);
+        let behind = self.smooth_color(solid.as_ref(), range_per_depth);
+        let over = |behind: DVec3, (met, alpha): &(Met, f64)| behind.lerp(self.smooth_color(Some(met), range_per_depth), *alpha);
         Light { color: panes.iter().rev().fold(behind, over), panes: panes.iter().map(|(met, _)| met.surface).collect() }
     }
 
@@ -173,26 +176,46 @@ impl Surfaces {
     /// Linear light that arrives along a ray of `range_per_depth` metres for each metre of its depth: the nearest texel of what it met, or the
     /// sky, and fog.
     pub fn color(&self, met: Option<&Met>, range_per_depth: f64) -> DVec3 {
+        self.color_by(met, range_per_depth, |texture, table, met| {
+            let [x, y] = [0, 1].map(|axis: usize| {
+                let side = f64::from(texture.size_px[axis]);
+                (met.uv[axis].rem_euclid(1.0) * side).min(side - 1.0) as usize
+            });
+            let first = 4 * (y * texture.size_px[0] as usize + x);
+            let light = |channel: usize| texture.rgba8.get(first + channel).map_or(0.0, |&byte| f64::from(table[usize::from(byte)]));
+            DVec3::new(light(0), light(1), light(2))
+        })
+    }
+
+    /// The same, between the texels: two rays to one point see the same, however they round.
+    fn smooth_color(&self, met: Option<&Met>, range_per_depth: f64) -> DVec3 {
+        self.color_by(met, range_per_depth, |texture, table, met| {
+            let material = self.mesh(met).map(|mesh| &mesh.material);
+            let (wrap, nearest) = material.map_or(([Wrap::Clamp; 2], false), |material| (material.wrap, material.nearest));
+            let light = |pixel: &[u8]| DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(table[usize::from(pixel[channel])])));
+            texture.read_at(met.uv, wrap, nearest, light)
+        })
+    }
+
+    fn color_by(&self, met: Option<&Met>, range_per_depth: f64, of_picture: impl Fn(&Texture, &[f32; 256], &Met) -> DVec3) -> DVec3 {
         let sky = DVec3::from_array(self.scene.sky_linear.map(f64::from));
         let Some((met, texture)) = met.and_then(|met| Some((met, self.texture(met)?))) else { return sky };
-        let [x, y] = [0, 1].map(|axis: usize| {
-            let side = f64::from(texture.size_px[axis]);
-            (met.uv[axis].rem_euclid(1.0) * side).min(side - 1.0) as usize
-        });
-        let first = 4 * (y * texture.size_px[0] as usize + x);
         let table = self.linear.iter().find(|(encoding, _)| *encoding == texture.encoding).map_or(&self.linear[0].1, |(_, table)| table);
-        let light = |channel: usize| texture.rgba8.get(first + channel).map_or(0.0, |&byte| f64::from(table[usize::from(byte)]));
         let clear = self
             .scene
             .fog_visibility_m
             .map_or(1.0, |visibility_m| (-FOG_AT_VISIBILITY * met.depth_m * range_per_depth / visibility_m).exp());
-        let own = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map_or([0.0; 3], |mesh| mesh.material.emissive);
-        let light = met.tint * DVec3::new(light(0), light(1), light(2)) + DVec3::from_array(own.map(f64::from));
+        let own = self.mesh(met).map_or([0.0; 3], |mesh| mesh.material.emissive);
+        let light = met.tint * of_picture(texture, table, met) + DVec3::from_array(own.map(f64::from));
         sky + clear * (light - sky)
     }
 
+    fn mesh(&self, met: &Met) -> Option<&Mesh> {
+        met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i))
+    }
+
     fn texture(&self, met: &Met) -> Option<&Texture> {
-        let of_mesh = met.surface.checked_sub(1).and_then(|i| self.scene.meshes.get(i)).map(|mesh| &*mesh.material.texture);
+        let of_mesh = self.mesh(met).map(|mesh| &*mesh.material.texture);
         of_mesh.or(self.terrain().map(|terrain| &*terrain.texture))
     }
 

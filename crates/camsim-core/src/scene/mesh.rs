@@ -161,8 +161,7 @@ impl Mesh {
 
     /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right side, and no hole.
     pub(crate) fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
-        self.faces(corners, direction_ned)
-            && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
+        self.faces(corners, direction_ned) && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
     }
 
     /// Whether a triangle is there for what looks along a direction.

@@ -230,20 +230,20 @@ mod tests {
         assert_eq!(all, (0..300).collect::<Vec<_>>(), "each once");
         assert_eq!(wrong_places(&triangles, &order), 0);
         let naive = wrong_places(&triangles, &by_distance(&triangles));
-        assert!(naive > 20, "distance alone would not do: {naive}");
+        assert!(naive > 10, "distance alone would not do: {naive}");
     }
 
     #[test]
     fn a_small_pane_before_the_end_of_a_large_one_comes_last() {
         let pane = |x: f64, size: f64, z: f64| {
             let corner = |i: f64, j: f64| DVec3::new(x + i * size, j * size, z);
-            [corner(-1.0, -1.0), corner(1.0, -1.0), corner(0.0, 1.0)]
+            [corner(-1.0, -0.5), corner(1.0, -0.5), corner(0.0, 1.0)]
         };
         // Seen from the middle of the large one, whose middle is nearer.
-        let triangles = [pane(18.0, 1.0, 9.0), pane(0.0, 30.0, 10.0)];
+        let triangles = [pane(12.0, 1.0, 9.0), pane(0.0, 30.0, 10.0)];
         assert!(triangles[0].iter().sum::<DVec3>().length() > triangles[1].iter().sum::<DVec3>().length());
         assert_eq!(back_to_front(&triangles).unwrap(), [1, 0]);
-        let behind = [pane(18.0, 1.0, 11.0), pane(0.0, 30.0, 10.0)];
+        let behind = [pane(12.0, 1.0, 11.0), pane(0.0, 30.0, 10.0)];
         assert_eq!(back_to_front(&behind).unwrap(), [0, 1]);
     }
 
@@ -255,7 +255,8 @@ mod tests {
             [DVec3::new(-1.0, 0.4, 9.0), DVec3::new(3.0, 0.6, 11.0), DVec3::new(3.0, 0.8, 11.0)].map(|at| turn * at)
         };
         let across = [DVec3::new(-3.0, -1.0, 8.0), DVec3::new(3.0, -1.0, 12.0), DVec3::new(0.0, 2.0, 10.0)];
-        let mut triangles = vec![bar(0.0), bar(1.0), bar(2.0), across, across.map(|at| DVec3::new(-at.x, at.y, at.z)), across.map(|at| -at)];
+        let mut triangles =
+            vec![bar(0.0), bar(1.0), bar(2.0), across, across.map(|at| DVec3::new(-at.x, at.y, at.z)), across.map(|at| -at)];
         triangles.extend([[DVec3::ZERO; 3], [DVec3::NAN; 3], [DVec3::INFINITY; 3], [DVec3::Z; 3]]);
         let mut order = back_to_front(&triangles).unwrap();
         order.sort_unstable();

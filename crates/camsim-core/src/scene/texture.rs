@@ -1,6 +1,10 @@
 //! Pictures that cover surfaces, and their smaller versions.
 
-use std::{borrow::Cow, fmt};
+use std::{
+    borrow::Cow,
+    fmt,
+    ops::{Add, Mul},
+};
 
 use half::f16;
 use rayon::prelude::*;
@@ -142,10 +146,18 @@ impl Texture {
 
     /// Alpha at texture coordinates, 0..=1: bilinear, or that of the nearest pixel.
     pub(crate) fn alpha_at(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool) -> f64 {
+        self.read_at(uv, wrap, nearest, |pixel| f64::from(pixel[3]) / 255.0)
+    }
+
+    /// What `value` makes of pixels, at texture coordinates: bilinear, or that of the nearest pixel.
+    pub(crate) fn read_at<T>(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool, value: impl Fn(&[u8]) -> T) -> T
+    where
+        T: Add<Output = T> + Mul<f64, Output = T>,
+    {
         let at = [0, 1].map(|k: usize| uv[k] * f64::from(self.size_px[k]) - 0.5);
         let read = |x: f64, y: f64| {
             let index = wrap[1].texel(y, self.size_px[1]) * self.size_px[0] as usize + wrap[0].texel(x, self.size_px[0]);
-            self.rgba8.get(4 * index + 3).map_or(1.0, |&byte| f64::from(byte) / 255.0)
+            value(self.rgba8.get(4 * index..4 * index + 4).unwrap_or(&[0, 0, 0, 255]))
         };
         if nearest {
             return read((at[0] + 0.5).floor(), (at[1] + 0.5).floor());

@@ -30,8 +30,11 @@ pub(super) struct Drawing {
 }
 
 /// Colours come times their alpha.
-const OVER: wgpu::BlendComponent =
-    wgpu::BlendComponent { src_factor: wgpu::BlendFactor::One, dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha, operation: wgpu::BlendOperation::Add };
+const OVER: wgpu::BlendComponent = wgpu::BlendComponent {
+    src_factor: wgpu::BlendFactor::One,
+    dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
+    operation: wgpu::BlendOperation::Add,
+};
 
 impl Drawing {
     fn target(self, format: wgpu::TextureFormat) -> wgpu::ColorTargetState {

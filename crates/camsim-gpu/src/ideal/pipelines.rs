@@ -61,7 +61,12 @@ pub(super) struct SurfacePipelines {
 }
 
 impl IdealPass {
-    pub(super) fn surface_pipelines(&self, gpu: &GpuContext, key: SurfaceKey, batches: &[MeshBatch]) -> Result<SurfacePipelines, ComposeError> {
+    pub(super) fn surface_pipelines(
+        &self,
+        gpu: &GpuContext,
+        key: SurfaceKey,
+        batches: &[MeshBatch],
+    ) -> Result<SurfacePipelines, ComposeError> {
         let mesh_vertices = wgpu::VertexBufferLayout {
             array_stride: size_of::<MeshVertexData>() as u64,
             step_mode: wgpu::VertexStepMode::Vertex,

@@ -6,7 +6,7 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
     scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
-    scene::{Encoding, Light, Mesh, Scene, linear_from_srgb, ned_from_board},
+    scene::{Encoding, Light, Mesh, Scene, linear_from_srgb, ned_from_board, paint_order::MOST_TRIANGLES},
 };
 use glam::DVec3;
 
@@ -55,7 +55,20 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
     for spec in &spec.gltf {
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
     }
+    notes.extend(too_many_to_order(&scene));
     Ok((scene, summary, notes))
+}
+
+/// What there is to say where more is blended than an order is found for.
+fn too_many_to_order(scene: &Scene) -> Option<String> {
+    let blended = scene.meshes.iter().filter(|mesh| mesh.material.blends);
+    let triangles: usize = blended.map(|mesh| mesh.shape.indices.len() / 3).sum();
+    (triangles > MOST_TRIANGLES).then(|| {
+        format!(
+            "scene.gltf: {triangles} triangles are blended; frames with more than {MOST_TRIANGLES} of them in view draw them mesh by mesh by distance, and may \
+             mix those of meshes within each other in the wrong order; if their alpha is 0 or 1, alphaMode MASK does without"
+        )
+    })
 }
 
 /// A model wherever it is to stand; gives what there is to say about it.
@@ -134,4 +147,22 @@ fn no_origin(scenario: &Scenario, key: &'static str) -> LoadError {
 fn undulation(lat_rad: f64, lon_rad: f64) -> f64 {
     thread_local!(static GEOID: RefCell<GeoidCache> = RefCell::new(GeoidCache::new()));
     GEOID.with_borrow_mut(|geoid| geoid.undulation_m(Geodetic { lat_rad, lon_rad, height_m: 0.0 }))
+}
+
+#[cfg(test)]
+mod tests {
+    use camsim_core::scene::{Encoding, Texture};
+
+    use super::*;
+
+    #[test]
+    fn what_is_too_much_to_order_is_said() {
+        let texture = Arc::new(Texture::uniform([255, 255, 255, 99], Encoding::Linear));
+        let mut pane = Mesh::level_picture(texture, DVec3::ZERO, 1.0);
+        let note = |mesh: &Mesh, count: usize| too_many_to_order(&Scene { meshes: vec![mesh.clone(); count], ..Scene::default() });
+        assert_eq!(note(&pane, MOST_TRIANGLES), None);
+        pane.material.blends = true;
+        assert_eq!(note(&pane, MOST_TRIANGLES / 2), None);
+        assert!(note(&pane, MOST_TRIANGLES / 2 + 1).is_some_and(|note| note.contains("16386 triangles are blended")));
+    }
 }
