@@ -260,7 +260,12 @@ impl Planner {
         motion::note_skips(&motion, temporal, &mut skipped);
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
         predicted.holes_of_one = looks_behind.then(|| truths.holes(&[look.key()], quality.max_error_px));
-        let wanted = keys::wanted(predicted.holes_of_one.as_ref(), temporal, quality, &mut skipped);
+        let for_layers = match look.common {
+            None => keys::for_layers(scenery.layers_dn(), predicted.without_layers_dn(), quality.max_error_dn),
+            // Each frame of a group has the one that is common to all.
+            Some(_) => 1,
+        };
+        let wanted = keys::wanted(predicted.holes_of_one.as_ref(), for_layers, temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {
             let keys = keys::spread(look.path(), window_s, count);
             let ideal = look.geometry(&keys, sampling.scale, Some(temporal));
@@ -275,6 +280,12 @@ impl Planner {
         );
         predicted.holes =
             if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
+        if keys.len() > 1 && scenery.layers.is_some() {
+            predicted.layers = look.layers(&keys);
+            let by_layers_dn = predicted.layers.map_or(0.0, |layers| layers.error_dn);
+            predicted.levels_in_the_way = levels::in_the_way(quality, &sampling, expected, &picture, by_layers_dn);
+            predicted.levels_kept = predicted.levels_in_the_way.is_none();
+        }
         self.note_static_skips(&mut skipped, temporal);
         // Coordinates are those of the middle of the frame's own window, wherever the ideal frame is taken.
         let middle_s = 0.5 * (window_s[0] + window_s[1]);

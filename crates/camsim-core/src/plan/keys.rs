@@ -4,6 +4,7 @@
 use super::{
     EdgeStage, Holes, MAX_IDEAL_PX, Skip, TemporalStage,
     edges::{FINE_PIXEL_BYTES, scale_of},
+    levels::NEARLY,
 };
 use crate::{mount::CameraPath, pose::CameraPose, scenario::QualitySpec, temporal::IdealGeometry};
 
@@ -51,7 +52,13 @@ pub(super) fn nearest_first(keys: &[KeyFrame], t_s: f64) -> Vec<&KeyFrame> {
 /// the first, so it is for holes that would be a large part of either tolerance: of `quality.max_error_dn` by their colours, which is an RMS
 /// over the picture, or of `quality.max_error_px` by the places that these are read from, which are off by as much as the strips are
 /// wide, and may be so in a hundredth of the pixels.
-pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> u32 {
+pub(super) fn wanted(
+    holes: Option<&Holes>,
+    for_layers: u32,
+    temporal: TemporalStage,
+    quality: &QualitySpec,
+    skipped: &mut Vec<Skip>,
+) -> u32 {
     let mut one = |reason: String| {
         skipped.push(Skip { what: "second ideal frame", reason });
         1
@@ -65,6 +72,9 @@ pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &Q
     if let Some(count) = quality.key_frames.value() {
         return if count <= 1 { one("quality.key_frames is 1".into()) } else { count.min(MAX_KEYS) };
     }
+    if for_layers > 1 {
+        return for_layers.min(MAX_KEYS);
+    }
     let Some(Holes { share, width_px, wide_share, error_dn, .. }) = holes else {
         return one("no silhouette is seen sample by sample".into());
     };
@@ -75,6 +85,14 @@ pub(super) fn wanted(holes: Option<&Holes>, temporal: TemporalStage, quality: &Q
         return one("no hole was found behind silhouettes".into());
     }
     one(format!("holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
+}
+
+/// Number of ideal frames that mixed light asks for: each line is as many times nearer in time to its own, and the layers are displaced by as much less.
+/// As many as keep `quality.max_error_dn`, or come near to the least error there is; `rest_dn` is what else there is of it.
+pub(super) fn for_layers(layers_dn: f64, rest_dn: f64, max_error_dn: f64) -> u32 {
+    let with = |count: u32| rest_dn.hypot(layers_dn / f64::from(count));
+    let enough_dn = max_error_dn.max(NEARLY * with(MAX_KEYS));
+    (1..=MAX_KEYS).find(|&count| with(count) <= enough_dn).unwrap_or(MAX_KEYS)
 }
 
 /// As many ideal frames as `wanted`, or as fit one above the other into a texture; `None` for one.
@@ -123,6 +141,15 @@ mod tests {
         assert_eq!(times(0.45), [0.375, 0.625, 0.125, 0.875]);
         assert_eq!(times(2.0), [0.875, 0.625, 0.375, 0.125]);
         assert_eq!(nearest_first(&keys[..1], 0.3).len(), 1);
+    }
+
+    #[test]
+    fn mixed_light_takes_what_it_needs_and_no_more() {
+        assert_eq!([0.0, 0.9, 1.1, 2.5, 3.9].map(|dn| for_layers(dn, 0.1, 1.0)), [1, 1, 2, 3, 4]);
+        // Where something else is in the way three would be hardly better than two.
+        assert_eq!(for_layers(2.5, 2.3, 1.0), 2);
+        assert_eq!(for_layers(0.5, 2.3, 1.0), 1);
+        assert_eq!(for_layers(40.0, 0.1, 1.0), MAX_KEYS);
     }
 
     #[test]

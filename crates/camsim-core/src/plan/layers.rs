@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{LensReach, probes::Probe, surfaces::Surfaces};
-use crate::{mount::CameraPath, pose::CameraPose, shutter::Shutter};
+use super::{KeyFrame, LensReach, keys::nearest_first, probes::Probe, surfaces::Surfaces};
+use crate::{mount::CameraPath, shutter::Shutter};
 
 /// Times what is expected: of a few hundred probes few may see a pane.
 const SAFETY: f64 = 1.2;
@@ -33,8 +33,8 @@ pub(super) struct Search<'a> {
     pub path: &'a CameraPath,
     pub shutter: &'a Shutter,
     pub stamp_s: f64,
-    /// The ideal frame's camera.
-    pub key_pose: &'a CameraPose,
+    /// The ideal frames, of which each line looks into the nearest in time.
+    pub keys: &'a [KeyFrame],
     /// Of the linear range for a pixel, for each unit of light that arrives.
     pub gain: &'a (dyn Fn([u32; 2]) -> f64 + Sync),
 }
@@ -58,19 +58,20 @@ impl Search<'_> {
     fn square(&self, i: usize, probe: &Probe) -> Option<f64> {
         let phase = PHASES[i % PHASES.len()];
         let [x, y] = probe.pixel;
-        let t_s = self.stamp_s + self.shutter.dt_pixel_s(x, y) + phase * self.shutter.exposure_s();
-        let pose = self.path.pose(t_s);
+        let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
+        let key_pose = nearest_first(self.keys, mid_s).first()?.pose;
+        let pose = self.path.pose(mid_s + phase * self.shutter.exposure_s());
         let way_ned = pose.ned_from_camera * probe.uv.extend(1.0);
         let met = self.surfaces.meet(pose.position_ned_m, way_ned);
         let range_per_depth = probe.uv.extend(1.0).length();
         let own = self.surfaces.light(pose.position_ned_m, way_ned, met.as_ref(), range_per_depth);
         // The point in the key camera, or the direction to what is infinitely far.
-        let to_point_ned = met.map_or(way_ned, |met| pose.position_ned_m + met.depth_m * way_ned - self.key_pose.position_ned_m);
-        let in_key = self.key_pose.ned_from_camera.conjugate() * to_point_ned;
+        let to_point_ned = met.map_or(way_ned, |met| pose.position_ned_m + met.depth_m * way_ned - key_pose.position_ned_m);
+        let in_key = key_pose.ned_from_camera.conjugate() * to_point_ned;
         let depth_m = in_key.z;
         let key_way_ned = to_point_ned / depth_m;
-        let found = self.surfaces.meet(self.key_pose.position_ned_m, key_way_ned);
-        let seen = self.surfaces.light(self.key_pose.position_ned_m, key_way_ned, found.as_ref(), (in_key / depth_m).length());
+        let found = self.surfaces.meet(key_pose.position_ned_m, key_way_ned);
+        let seen = self.surfaces.light(key_pose.position_ned_m, key_way_ned, found.as_ref(), (in_key / depth_m).length());
         if own.panes.is_empty() && seen.panes.is_empty() {
             return None;
         }

@@ -265,7 +265,7 @@ fn dn(square: f64) -> f64 {
     (SAFETY * 255.0 * square.sqrt()).hypot(FORMAT_DN)
 }
 
-/// Why the tolerance is not kept; `None` if it is.
+/// Why the tolerance is not kept; `None` if it is. `by_layers_dn` is what mixed light costs by having one depth.
 pub(super) fn in_the_way(
     quality: &QualitySpec,
     sampling: &Sampling,

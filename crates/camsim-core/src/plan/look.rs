@@ -126,7 +126,7 @@ impl<'a> Look<'a> {
         Scenery {
             prospect: prospect::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
-            layers: self.layers(),
+            layers: self.layers(&[self.key()]),
             ideal,
             motion,
             reason_for_none,
@@ -153,12 +153,12 @@ impl<'a> Look<'a> {
 }
 
 impl Look<'_> {
-    /// What mixed light costs.
-    fn layers(&self) -> Option<layers::Layers> {
+    /// What mixed light costs with these ideal frames.
+    pub fn layers(&self, keys: &[KeyFrame]) -> Option<layers::Layers> {
         let Planner { sequence, shutter, surfaces, .. } = self.planner;
-        let &Self { stamp_s, ref key_pose, ref reach, .. } = self;
+        let &Self { stamp_s, ref reach, .. } = self;
         let gain = &prospect::gain(sequence, &reach.camera);
-        let search = layers::Search { reach, surfaces, path: self.path(), shutter, stamp_s, key_pose, gain };
+        let search = layers::Search { reach, surfaces, path: self.path(), shutter, stamp_s, keys, gain };
         // The paper's errors are not judged.
         if self.is_paper() { None } else { search.layers() }
     }

@@ -55,8 +55,12 @@ impl Predicted {
     /// What `quality.max_error_dn` bounds, all together: RMS over the picture, 1/255 of the linear range.
     #[must_use]
     pub fn picture_dn(&self) -> f64 {
+        self.without_layers_dn().hypot(self.layers.map_or(0.0, |layers| layers.error_dn))
+    }
+
+    /// The same without what mixed light costs by having one depth.
+    pub(super) fn without_layers_dn(&self) -> f64 {
         let at_silhouettes_dn = self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-        let by_layers_dn = self.layers.map_or(0.0, |layers| layers.error_dn);
-        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn).hypot(by_layers_dn)
+        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use camsim_core::{
     plan::Planner,
     reference::Oracle,
-    scenario::Channel,
+    scenario::{Auto, Channel},
     scene::{Encoding, Mesh, Scene, Texture},
 };
 use glam::{DMat3, DVec2, DVec3};
@@ -108,8 +108,9 @@ fn each_layer_has_its_own_fog_and_light_of_its_own_is_as_clear_as_it() {
 /// A camera that flies over a pane above a picture: what the plan says of the mixture's one depth against the difference that it makes.
 #[test]
 fn the_plan_tells_what_one_depth_costs() {
-    let predicted = |meshes: Vec<Mesh>, speed_m_s: f64| {
+    let predicted = |meshes: Vec<Mesh>, speed_m_s: f64, keys: u32| {
         let mut scenario = scenario();
+        scenario.quality.key_frames = Auto::Value(keys);
         scenario.camera.shutter.readout_ms = 60.0;
         let motion = Steady { velocity_ned_m_s: DVec3::new(0.0, speed_m_s, 0.0), ..Steady::standing(DVec3::new(0.0, 0.0, -100.0)) };
         let sequence = sequence(scenario, motion, Scene { meshes, sky_linear: SKY.as_vec3().to_array(), ..Scene::default() });
@@ -117,20 +118,23 @@ fn the_plan_tells_what_one_depth_costs() {
     };
     let ground = || crate::fixtures::plane(400.0).meshes;
     let with = |panes: &[Mesh]| [ground(), panes.to_vec()].concat();
-    let none = predicted(ground(), 40.0);
+    let none = predicted(ground(), 40.0, 1);
     assert!(none.predicted.layers.is_none() && none.skipped.iter().any(|skip| skip.what.contains("mixing")));
     // One colour: wherever the pane is seen, it is the same; but for its border.
     let wide = Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(8.0, 8.0, 1.0)), ..pane(RED, 0.3, 40.0) };
-    let plain = predicted(with(&[wide.clone()]), 40.0).predicted.layers.unwrap();
+    let plain = predicted(with(&[wide.clone()]), 40.0, 1).predicted.layers.unwrap();
     assert!(plain.share > 0.99 && plain.error_dn < 1e-6, "{plain:?}");
     // Alpha from 0 to 0.48 over 480 m to the east, above ground of one colour: of a ray to a point of that, which comes from a camera d m further
     // east, 40 m of 100 m below the pane, alpha differs by 0.001 * 0.4 d. Lines are even over the 60 ms.
     let mut ramp = wide.clone();
     Arc::make_mut(&mut ramp.shape).vertices.iter_mut().for_each(|vertex| vertex.tint[3] = 0.48 * vertex.uv[0]);
     let ground = Mesh { ned_from_shape: wide.ned_from_shape, ..level(WALL, 1.0, 0.0) };
-    for speed_m_s in [0.0, 30.0, 300.0] {
-        let found = predicted(vec![ground.clone(), ramp.clone()], speed_m_s).predicted.layers.unwrap();
-        let rms_m = 0.03 * speed_m_s / 3.0_f64.sqrt();
+    for (speed_m_s, keys) in [(0.0, 1), (30.0, 1), (300.0, 1), (300.0, 2), (300.0, 4)] {
+        let plan = predicted(vec![ground.clone(), ramp.clone()], speed_m_s, keys);
+        let found = plan.predicted.layers.unwrap();
+        assert_eq!(plan.keys.len(), if speed_m_s > 0.0 { keys as usize } else { 1 });
+        // From the nearest of the ideal frames, which are in the middles of equal parts.
+        let rms_m = 0.03 * speed_m_s / 3.0_f64.sqrt() / f64::from(keys);
         let expected_dn = 255.0 * 0.001 * 0.4 * rms_m * (RED - WALL).length() / 3.0_f64.sqrt();
         // Times a margin of 1.2; the pixels that are looked at are even over lines to some hundredths.
         assert!((found.error_dn / 1.2 - expected_dn).abs() < 0.05 * expected_dn + 1e-6, "{found:?} {expected_dn}");
