@@ -7,7 +7,7 @@ use std::sync::Arc;
 use camsim_core::{
     plan::FramePlan,
     reference::{Oracle, RenderOptions},
-    scenario::{Auto, Channel, MountSpec},
+    scenario::{Auto, Channel, MountSpec, Preset},
     scene::{Encoding, Light, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
 };
@@ -138,6 +138,18 @@ fn light_fog_and_light_of_its_own_are_mixed_too() {
     found.expect_in_the_middle("fog", air(over(RED + own, 0.4, air(WALL, 40.0)), 60.0), 100.0);
 }
 
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn the_papers_frames_mix_too() {
+    let mut sequence = standing(vec![pane(RED, 0.3, 40.0), level(WALL, 1.0, 0.0)]);
+    Arc::make_mut(&mut sequence).scenario.quality.preset = Preset::Paper;
+    let found = render(&engine(), &sequence, &[Channel::Color], 0).frame.color_rgba;
+    let at = 4 * (60 * 160 + 80);
+    let found = DVec3::from_array([0, 1, 2].map(|channel: usize| f64::from(found[at + channel])));
+    // Stored with 8 bits of sRGB, whose widest step is 0.009 of light, once for the wall and once for the pane.
+    assert!((found - over(RED, 0.3, WALL)).abs().max_element() < 9e-3, "{found}");
+}
+
 /// A disc of alpha over a picture that changes smoothly.
 fn disc() -> Texture {
     let side = 64;
@@ -229,7 +241,11 @@ fn what_one_depth_costs_is_foretold() {
         let measured_dn = 255.0 * 10_f64.powf(-found.psnr_db() / 20.0) * (4.0_f64 / 3.0).sqrt();
         let predicted = &found.plan.predicted;
         let count = found.plan.keys.len();
-        eprintln!("{speed_m_s} m/s, {count} keys: {measured_dn:.2}/255 measured, {:.2} predicted, {:?}", predicted.picture_dn(), predicted.layers);
+        eprintln!(
+            "{speed_m_s} m/s, {count} keys: {measured_dn:.2}/255 measured, {:.2} predicted, {:?}",
+            predicted.picture_dn(),
+            predicted.layers
+        );
         assert!(measured_dn < 1.5 * predicted.picture_dn(), "{measured_dn} of {}", predicted.picture_dn());
         errors.push((measured_dn, predicted.layers.expect("a pane").error_dn, predicted.levels_in_the_way.clone()));
     }

@@ -4,14 +4,24 @@
 //! other layers are not quite those that its own ray passes: they are displaced by the parallax between them. What that costs is found by doing it: at
 //! each probe the light of its own ray beside the light of the ideal camera's ray to the same point.
 
+use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{KeyFrame, LensReach, keys::nearest_first, probes::Probe, surfaces::Surfaces};
+use super::{
+    KeyFrame, LensReach,
+    keys::nearest_first,
+    probes::{Probe, spacing_px},
+    surfaces::Surfaces,
+};
 use crate::{mount::CameraPath, shutter::Shutter};
 
-/// Times what is expected: of a few hundred probes few may see a pane.
+/// Times what is expected: of a few thousand rays few may pass near a pane's border.
 const SAFETY: f64 = 1.2;
+/// Rays around each probe, over the part of the picture that it stands for: where panes are of one colour all of the error is at their borders, which are
+/// few. Irrational steps, so that they are even over it.
+const LOOKS: u32 = 12;
+const SPREAD: DVec2 = DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053);
 /// Phases of the exposure that the probes take turns in.
 const PHASES: [f64; 3] = [0.0, -0.5, 0.5];
 /// Depth of the point that the ideal camera meets, relative, within which it is the same: beyond that it is hidden, and counted as a hole.
@@ -47,23 +57,33 @@ impl Search<'_> {
         }
         let probes = &self.reach.probes;
         // Summed in their order: a plan does not depend on how threads share work.
-        let squares: Vec<Option<f64>> = probes.par_iter().enumerate().map(|(i, probe)| self.square(i, probe)).collect();
-        let count = probes.len().max(1) as f64;
+        let looks = |(i, probe): (usize, &Probe)| -> [Option<f64>; LOOKS as usize] {
+            std::array::from_fn(|k| self.square(i + k, probe, (f64::from(i as u32 * LOOKS + k as u32) * SPREAD).fract() - 0.5))
+        };
+        let squares: Vec<_> = probes.par_iter().enumerate().map(looks).collect();
+        let squares = squares.as_flattened();
+        let count = squares.len().max(1) as f64;
         let mixed = squares.iter().flatten();
         let share = mixed.clone().count() as f64 / count;
         Some(Layers { share, error_dn: SAFETY * 255.0 * (mixed.sum::<f64>() / count).sqrt() })
     }
 
-    /// Squared error at a probe, of the linear range, mean over the channels; `None` where light is of one surface.
-    fn square(&self, i: usize, probe: &Probe) -> Option<f64> {
+    /// Squared error at a place of a probe's part of the picture (-0.5 to 0.5), of the linear range, mean over the channels; `None` where light
+    /// is of one surface.
+    fn square(&self, i: usize, probe: &Probe, place: DVec2) -> Option<f64> {
         let phase = PHASES[i % PHASES.len()];
-        let [x, y] = probe.pixel;
+        let size_px = self.reach.camera.size_px;
+        let offset_px = (spacing_px(&self.reach.camera) * place).round();
+        let [x, y] = [(0, offset_px.x), (1, offset_px.y)]
+            .map(|(axis, offset): (usize, f64)| (f64::from(probe.pixel[axis]) + offset).clamp(0.0, f64::from(size_px[axis] - 1)) as u32);
+        let moved_px = DVec2::new(f64::from(x), f64::from(y)) - DVec2::from_array(probe.pixel.map(f64::from));
+        let uv = probe.uv + probe.uv_from_px * moved_px;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let key_pose = nearest_first(self.keys, mid_s).first()?.pose;
         let pose = self.path.pose(mid_s + phase * self.shutter.exposure_s());
-        let way_ned = pose.ned_from_camera * probe.uv.extend(1.0);
+        let way_ned = pose.ned_from_camera * uv.extend(1.0);
         let met = self.surfaces.meet(pose.position_ned_m, way_ned);
-        let range_per_depth = probe.uv.extend(1.0).length();
+        let range_per_depth = uv.extend(1.0).length();
         let own = self.surfaces.light(pose.position_ned_m, way_ned, met.as_ref(), range_per_depth);
         // The point in the key camera, or the direction to what is infinitely far.
         let to_point_ned = met.map_or(way_ned, |met| pose.position_ned_m + met.depth_m * way_ned - key_pose.position_ned_m);
@@ -80,7 +100,7 @@ impl Search<'_> {
             (None, None) => depth_m > 0.0,
             _ => false,
         };
-        let square = (self.gain)(probe.pixel).powi(2) * (own.color - seen.color).length_squared() / 3.0;
+        let square = (self.gain)([x, y]).powi(2) * (own.color - seen.color).length_squared() / 3.0;
         Some(if is_same { square } else { 0.0 })
     }
 }

@@ -122,7 +122,7 @@ fn the_plan_tells_what_one_depth_costs() {
     assert!(none.predicted.layers.is_none() && none.skipped.iter().any(|skip| skip.what.contains("mixing")));
     // One colour: wherever the pane is seen, it is the same; but for its border.
     let wide = Mesh { ned_from_shape: DMat3::from_diagonal(DVec3::new(8.0, 8.0, 1.0)), ..pane(RED, 0.3, 40.0) };
-    let plain = predicted(with(&[wide.clone()]), 40.0, 1).predicted.layers.unwrap();
+    let plain = predicted(with(std::slice::from_ref(&wide)), 40.0, 1).predicted.layers.unwrap();
     assert!(plain.share > 0.99 && plain.error_dn < 1e-6, "{plain:?}");
     // Alpha from 0 to 0.48 over 480 m to the east, above ground of one colour: of a ray to a point of that, which comes from a camera d m further
     // east, 40 m of 100 m below the pane, alpha differs by 0.001 * 0.4 d. Lines are even over the 60 ms.

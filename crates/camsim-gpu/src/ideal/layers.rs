@@ -163,3 +163,29 @@ fn runs(triangles: &[Triangle], order: &[u32]) -> Vec<Draw> {
     }
     draws
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Far away along the axis, of a placement of a batch.
+    fn triangle(batch: usize, placement: u32, far_m: f64) -> Triangle {
+        let at = |x: f64, y: f64| DVec3::new(x, y, far_m);
+        Triangle { batch, placement, corners: [0, 1, 2], in_camera_m: [at(-0.01, -0.01), at(0.01, -0.01), at(0.0, 0.02)] }
+    }
+
+    #[test]
+    fn meshes_within_each_other_are_drawn_one_after_the_other() {
+        // The middles of the two meshes are 10.5 and 11 m away.
+        let triangles = [triangle(0, 3, 10.0), triangle(1, 4, 10.5), triangle(0, 3, 11.0), triangle(1, 4, 11.5)];
+        let order = mesh_by_mesh(&triangles);
+        assert_eq!(order, [3, 1, 2, 0]);
+        let draws = runs(&triangles, &order);
+        assert_eq!(draws, [Draw { batch: 1, placement: 4, indices: 0..6 }, Draw { batch: 0, placement: 3, indices: 6..12 }]);
+        // With an order of their own they take turns.
+        let places: Vec<_> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
+        let order = back_to_front(&places).expect("few");
+        assert_eq!(order, [3, 2, 1, 0]);
+        assert_eq!(runs(&triangles, &order).len(), 4);
+    }
+}

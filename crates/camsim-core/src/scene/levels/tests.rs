@@ -162,3 +162,19 @@ fn the_error_is_what_is_seen() {
     let sheared = turned * DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::new(0.0, 0.0, 0.2));
     assert!((0..99).all(|k| (sheared * (DQuat::from_rotation_z(f64::from(k)) * DVec3::X)).length() <= stretch(&sheared)));
 }
+
+#[test]
+fn what_is_mixed_stays_whole() {
+    let texture = Arc::new(Texture::uniform([255, 255, 255, 128], Encoding::Linear));
+    let [shape, other] = [globe(24), globe(20)].map(Arc::new);
+    let mesh = |shape: &Arc<Shape>, blends: bool| {
+        let mut mesh = Mesh::level_picture(texture.clone(), DVec3::ZERO, 1.0);
+        (mesh.shape, mesh.material.blends) = (shape.clone(), blends);
+        mesh
+    };
+    // Both panes of a window may be within a level's error of one.
+    let scene = Scene { meshes: vec![mesh(&shape, false), mesh(&shape, true), mesh(&other, false)], ..Scene::default() };
+    let levels = SceneLevels::new(&scene);
+    assert_eq!(levels.of(&shape).levels().len(), 1);
+    assert!(levels.of(&other).levels().len() > 2);
+}
