@@ -11,7 +11,7 @@ use crate::{
     camera::{CameraModel, ZoomTable},
     frame::RowRecord,
     mount::CameraPath,
-    scenario::Channel,
+    scenario::{Auto, Channel},
     sequence::Sequence,
     shutter::{LinesAxis, Shutter},
     temporal::IdealGeometry,
@@ -261,9 +261,15 @@ impl Planner {
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
         predicted.holes_of_one = looks_behind.then(|| truths.holes(&[look.key()], quality.max_error_px));
         let for_layers = match look.common {
-            None => keys::for_layers(scenery.layers_dn(), predicted.without_layers_dn(), quality.max_error_dn),
+            None if quality.key_frames == Auto::Auto && scenery.layers.is_some() => {
+                let layers_dn = |count: u32| match count {
+                    1 => scenery.layers_dn(),
+                    _ => look.layers(&keys::spread(look.path(), window_s, count)).map_or(0.0, |layers| layers.error_dn),
+                };
+                keys::for_layers(layers_dn, predicted.without_layers_dn(), quality.max_error_dn)
+            }
             // Each frame of a group has the one that is common to all.
-            Some(_) => 1,
+            _ => 1,
         };
         let wanted = keys::wanted(predicted.holes_of_one.as_ref(), for_layers, temporal, quality, &mut skipped);
         let keys = keys::fitting(wanted, edges, self.max_side_px, &mut skipped, |count| {

@@ -87,12 +87,15 @@ pub(super) fn wanted(
     one(format!("holes in {:.4} % of the picture, {width_px:.2} px wide, cost {error_dn:.2}/255 over the picture", 100.0 * share))
 }
 
-/// Number of ideal frames that mixed light asks for: each line is as many times nearer in time to its own, and the layers are displaced by as much less.
-/// As many as keep `quality.max_error_dn`, or come near to the least error there is; `rest_dn` is what else there is of it.
-pub(super) fn for_layers(layers_dn: f64, rest_dn: f64, max_error_dn: f64) -> u32 {
-    let with = |count: u32| rest_dn.hypot(layers_dn / f64::from(count));
-    let enough_dn = max_error_dn.max(NEARLY * with(MAX_KEYS));
-    (1..=MAX_KEYS).find(|&count| with(count) <= enough_dn).unwrap_or(MAX_KEYS)
+/// Number of ideal frames that mixed light asks for: each line is then nearer in time to its own, and the layers are displaced by less. As many as keep
+/// `quality.max_error_dn`, or come near to the least error there is. `layers_dn` is what mixed light costs with a number of them, `rest_dn` what else there is.
+pub(super) fn for_layers(layers_dn: impl Fn(u32) -> f64, rest_dn: f64, max_error_dn: f64) -> u32 {
+    if rest_dn.hypot(layers_dn(1)) <= max_error_dn {
+        return 1;
+    }
+    let with: Vec<(u32, f64)> = (1..=MAX_KEYS).map(|count| (count, rest_dn.hypot(layers_dn(count)))).collect();
+    let enough_dn = max_error_dn.max(NEARLY * with.iter().map(|(_, dn)| *dn).fold(f64::INFINITY, f64::min));
+    with.into_iter().find(|(_, dn)| *dn <= enough_dn).map_or(1, |(count, _)| count)
 }
 
 /// As many ideal frames as `wanted`, or as fit one above the other into a texture; `None` for one.
@@ -145,11 +148,14 @@ mod tests {
 
     #[test]
     fn mixed_light_takes_what_it_needs_and_no_more() {
-        assert_eq!([0.0, 0.9, 1.1, 2.5, 3.9].map(|dn| for_layers(dn, 0.1, 1.0)), [1, 1, 2, 3, 4]);
+        // Gradual alpha, and borders.
+        let gradual = |dn: f64, rest_dn: f64| for_layers(|count| dn / f64::from(count), rest_dn, 1.0);
+        let sharp = |dn: f64, rest_dn: f64| for_layers(|count| dn / f64::from(count).sqrt(), rest_dn, 1.0);
+        assert_eq!([0.0, 0.9, 1.1, 2.5, 3.9].map(|dn| gradual(dn, 0.1)), [1, 1, 2, 3, 4]);
+        assert_eq!([0.9, 1.1, 1.5, 2.5].map(|dn| sharp(dn, 0.1)), [1, 2, 3, 4]);
         // Where something else is in the way three would be hardly better than two.
-        assert_eq!(for_layers(2.5, 2.3, 1.0), 2);
-        assert_eq!(for_layers(0.5, 2.3, 1.0), 1);
-        assert_eq!(for_layers(40.0, 0.1, 1.0), MAX_KEYS);
+        assert_eq!((gradual(2.5, 2.3), gradual(0.5, 2.3)), (2, 1));
+        assert_eq!(gradual(40.0, 0.1), MAX_KEYS);
     }
 
     #[test]
