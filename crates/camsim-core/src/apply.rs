@@ -96,7 +96,7 @@ pub struct Pipeline<'a> {
     solver: Solver,
     twist: Twist,
     edges: DepthEdges,
-    flow: Option<FlowSearch<'a>>,
+    flow: Option<FlowSearch>,
     /// Stored values, for the paper's preset only.
     stored_rgba: Vec<f32>,
     nodes: u32,
@@ -147,6 +147,14 @@ impl<'a> Pipeline<'a> {
         self.nodes
     }
 
+    /// Of a flow: the first and the last instant that is seen, shares of its interval after the ideal frame. Beyond 0 to 1 it is gone on with.
+    #[must_use]
+    pub fn flow_shares(&self) -> Option<[f64; 2]> {
+        let (first_s, last_s) = self.shutter.window_s();
+        let shares = [first_s, last_s].map(|at_s| self.flow_share(at_s - self.frame.instant_s));
+        self.flow.as_ref().map(|_| [shares[0].min(shares[1]), shares[0].max(shares[1])])
+    }
+
     /// Where a pixel looks in the ideal frame at exposure phase `phase` (-0.5 begin, 0.5 end).
     ///
     /// # Errors
@@ -161,7 +169,8 @@ impl<'a> Pipeline<'a> {
         let ideal = &self.frame.geometry;
         let holes = &self.frame.holes;
         if let Some(flow) = &self.flow {
-            return flow.source(ideal.px_from_point(uv.extend(1.0)), self.flow_share(dt_s - self.frame.instant_s), &self.depth(), ideal);
+            let share = self.flow_share(dt_s - self.frame.instant_s);
+            return flow.source(ideal.px_from_point(uv.extend(1.0)), share, &self.depth(), holes, ideal);
         }
         if self.solver == Solver::Reproject {
             return self.edges.source(uv, self.motion.key_from(dt_s, self.frame.instant_s), &self.depth(), holes, ideal);
@@ -267,7 +276,7 @@ impl<'a> Pipeline<'a> {
             Some(samples) => (f64::from(samples), samples.div_ceil(self.nodes - 1)),
             None => (SAMPLES_PER_PX, MAX_SAMPLES),
         };
-        if !self.meets_edge(dt_s, &sources, middle.at_px) {
+        if !self.meets_edge(uv, dt_s, &sources, middle.at_px) {
             return Ok(gather(&nodes_px, PathStage::Straight, &area, &self.color(), per_px, cap));
         }
         // Surfaces that part over the exposure: every sample finds its own.
@@ -284,17 +293,17 @@ impl<'a> Pipeline<'a> {
     }
 
     /// Whether surfaces meet near the sources, and the exposure's travel pulls them apart; or the polyline misses the path at its middle.
-    fn meets_edge(&self, dt_s: f64, sources: &[Source], middle_px: DVec2) -> bool {
+    fn meets_edge(&self, uv: DVec2, dt_s: f64, sources: &[Source], middle_px: DVec2) -> bool {
         let half = sources.len() / 2;
         let chord_px = sources[(sources.len() - 1) / 2].at_px.midpoint(sources[half].at_px);
         if chord_px.distance(middle_px) > BENT_PX {
             return true;
         }
-        if let Some(flow) = &self.flow {
-            let share = self.flow_share(self.shutter.exposure_s());
-            return flow.parts(sources.iter().map(|source| source.at_px), share, EDGE_PARALLAX_PX);
-        }
         let half_s = 0.5 * self.shutter.exposure_s();
+        if let Some(flow) = &self.flow {
+            let shares = [-half_s, half_s].map(|from_middle_s| self.flow_share(dt_s + from_middle_s - self.frame.instant_s));
+            return flow.parts(self.frame.geometry.px_from_point(uv.extend(1.0)), shares, EDGE_PARALLAX_PX);
+        }
         let (_, begin) = self.motion.key_from(dt_s - half_s, self.frame.instant_s);
         let (_, end) = self.motion.key_from(dt_s + half_s, self.frame.instant_s);
         let travel_px_m = self.frame.geometry.focal_px.max_element() * begin.distance(end);

@@ -149,6 +149,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let [width, height] = spec.size_px;
     console.note(format_args!("{}: {width}x{height}, {elapsed_s:.2} s", args.output.display()));
     tell_unseen(&unseen, f64::from(width) * f64::from(height), console);
+    tell_reach(args, &pipeline, console);
     console.detail(format_args!("{:.1} % of the ideal picture has no depth", 100.0 * file.without_depth));
     console.detail(format_args!("{} exposure nodes", pipeline.nodes()));
     Ok(())
@@ -207,11 +208,29 @@ fn tell_unseen(unseen: &UnseenCounts, pixels: f64, console: &mut Console<'_>) {
         (unseen.no_ray, "the lens has no ray there"),
         (unseen.outside, "beyond the border of the ideal picture, which should be larger"),
         (unseen.holes, "where the ideal picture has no depth (holes = \"mark\")"),
+        (unseen.unknown_flow, "where the flow is not known (not a number, or above 1e9)"),
+        (unseen.torn_flow, "where neighbours' flows have too little in common to be followed: is it a flow, in pixels, right and down?"),
     ];
     let reasons: Vec<String> =
         reasons.iter().filter(|(count, _)| *count > 0).map(|(count, why)| format!("{:.2} % {why}", percent(*count))).collect();
     if unseen.all() > 0 {
         console.warn(format_args!("{:.2} % of the picture is empty (alpha 0): {}", percent(unseen.all()), reasons.join("; ")));
+    }
+}
+
+/// How far beyond the two instants that a flow joins it is gone on with.
+fn tell_reach(args: &Args, pipeline: &Pipeline<'_>, console: &mut Console<'_>) {
+    let Some([first, last]) = pipeline.flow_shares() else { return };
+    let reach = format!("the shutter is open from {first:+.2} to {last:+.2} of the flow's interval after the picture");
+    if first.abs().max(last.abs()) > 1.0 + 1e-9 {
+        let frame = args.frame.display();
+        console.warn(format_args!(
+            "{frame}: {reach}: things are taken to go straight on, farther than was seen; check instant_ms and flow_interval_ms, or take a \
+             flow over a longer time"
+        ));
+    } else {
+        let beyond = if first < 0.0 || last > 1.0 { ": beyond it things are taken to go straight on" } else { "" };
+        console.detail(format_args!("{reach}{beyond}"));
     }
 }
 

@@ -64,6 +64,10 @@ pub enum Unseen {
     Outside,
     /// It looks where the depth is not known ([`IdealFrame::holes`]).
     Hole,
+    /// It looks where the flow is not known.
+    UnknownFlow,
+    /// What it looks at could not be found: neighbours' flows have too little in common.
+    TornFlow,
 }
 
 /// Pixels that show nothing, by reason.
@@ -75,6 +79,10 @@ pub struct UnseenCounts {
     pub outside: u64,
     /// [`Unseen::Hole`].
     pub holes: u64,
+    /// [`Unseen::UnknownFlow`].
+    pub unknown_flow: u64,
+    /// [`Unseen::TornFlow`].
+    pub torn_flow: u64,
 }
 
 impl UnseenCounts {
@@ -83,13 +91,15 @@ impl UnseenCounts {
             Unseen::NoRay => self.no_ray += 1,
             Unseen::Outside => self.outside += 1,
             Unseen::Hole => self.holes += 1,
+            Unseen::UnknownFlow => self.unknown_flow += 1,
+            Unseen::TornFlow => self.torn_flow += 1,
         }
     }
 
     /// All of them.
     #[must_use]
     pub fn all(&self) -> u64 {
-        self.no_ray + self.outside + self.holes
+        self.no_ray + self.outside + self.holes + self.unknown_flow + self.torn_flow
     }
 }
 
@@ -140,5 +150,7 @@ impl std::ops::AddAssign for UnseenCounts {
         self.no_ray += other.no_ray;
         self.outside += other.outside;
         self.holes += other.holes;
+        self.unknown_flow += other.unknown_flow;
+        self.torn_flow += other.torn_flow;
     }
 }

@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use glam::DMat3;
+use glam::{DMat2, DMat3};
 
 use super::*;
 use crate::lens::LensModel;
@@ -8,6 +8,7 @@ use crate::scenario::{FieldOr, LensSpec, ShutterSpec};
 use crate::temporal::IdealGeometry;
 
 mod flow;
+mod flow_interval;
 
 /// A frame whose pixels show the surface that `look` gives for a ray (u, v, 1): inverse depth and linear colour.
 fn frame(size_px: [u32; 2], focal: f64, look: impl Fn(DVec2) -> (f64, [f32; 3])) -> IdealFrame {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn of(size_px: [u32; 2], interval_s: f64, flow: impl Fn(DVec2) -> DVec2) -> Motion {
+pub(super) fn of(size_px: [u32; 2], interval_s: f64, flow: impl Fn(DVec2) -> DVec2) -> Motion {
     let at = |i: u32| flow(DVec2::new(f64::from(i % size_px[0]), f64::from(i / size_px[0]))).as_vec2().to_array();
     Motion::Flow(FlowField { size_px, px: (0..size_px[0] * size_px[1]).map(at).collect(), interval_s })
 }
@@ -131,12 +131,12 @@ fn what_is_not_known_is_empty_and_what_does_not_fit_is_refused() {
     let ideal = frame([120, 40], 50.0, |_| (0.1, [0.5; 3]));
     let motion = of([120, 40], 0.1, |at_px| if (55.0..65.0).contains(&at_px.x) { DVec2::NAN } else { DVec2::ZERO });
     let (rendered, counts) = Pipeline::new(&spec, &ideal, &motion, &Settings::default()).unwrap().render_and_count(None);
-    assert_eq!(counts, UnseenCounts { holes: 10 * 20, ..UnseenCounts::default() });
+    assert_eq!(counts, UnseenCounts { unknown_flow: 10 * 20, ..UnseenCounts::default() });
     let alpha: Vec<f32> = (24..36).map(|x| rendered.color_rgba[4 * (60 * 7 + x) + 3]).collect();
     assert_eq!(alpha, [1., 0., 0., 0., 0., 0., 0., 0., 0., 0., 0., 1.]);
     let nowhere = of([120, 40], 0.1, |_| DVec2::NAN);
     let counts = Pipeline::new(&spec, &ideal, &nowhere, &Settings::default()).unwrap().render_and_count(None).1;
-    assert_eq!(counts.holes, 60 * 20);
+    assert_eq!(counts, UnseenCounts { unknown_flow: 60 * 20, ..UnseenCounts::default() });
     let error = |motion: &Motion, settings: &Settings| Pipeline::new(&spec, &ideal, motion, settings).unwrap_err().to_string();
     assert!(error(&of([60, 20], 0.1, |_| DVec2::ZERO), &Settings::default()).contains("60x20 pixels beside a picture of 120x40"));
     assert!(error(&of([120, 40], 0.0, |_| DVec2::ZERO), &Settings::default()).contains("over 0 s"));
