@@ -20,8 +20,15 @@ pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<FlowField, F
     let (size_px, values) = if is_exr(path) { read_exr_flow(path, motion)? } else { read_flo(path)? };
     let scale = motion.flow_scale.unwrap_or([1.0; 2]);
     let known = |[u, v]: [f32; 2]| u.abs() <= UNKNOWN_PX && v.abs() <= UNKNOWN_PX;
-    let scaled = |uv: [f32; 2]| if known(uv) { [0, 1].map(|k: usize| uv[k] * scale[k] as f32) } else { [f32::NAN; 2] };
-    let px: Vec<[f32; 2]> = values.into_iter().map(scaled).collect();
+    let scaled = |uv: [f32; 2]| [0, 1].map(|k: usize| (f64::from(uv[k]) * scale[k]) as f32);
+    let px: Vec<[f32; 2]> = values.into_iter().map(|uv| if known(uv) { scaled(uv) } else { [f32::NAN; 2] }).collect();
+    // An infinity may stand for what is not known; a number that becomes one may not.
+    if px.iter().any(|uv| !uv[0].is_nan() && !known(*uv)) {
+        return Err(failure(
+            path,
+            format!("times motion.flow_scale = {scale:?} is more than 1e9 pixels: the scale makes pixels of what the file holds"),
+        ));
+    }
     if px.iter().all(|uv| uv[0].is_nan()) {
         return Err(failure(path, "has no pixel whose flow is known: values are pixels, and more than 1e9 is none"));
     }
@@ -35,6 +42,12 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<([u32; 2], Vec<[f32
         Some([u, v]) => [picture.named(u).map_err(wrong)?, picture.named(v).map_err(wrong)?],
         _ => picture.pair().map_err(wrong)?,
     };
+    if u.name == v.name {
+        return Err(failure(
+            path,
+            format!("has one channel {} for both names of motion.flow_channels: give that to the right, and that down", u.name),
+        ));
+    }
     if u.size_px != v.size_px || u.origin_px != v.origin_px {
         return Err(failure(path, format!("has flow channels of different sizes or places: {} {}", u.name, v.name)));
     }
@@ -51,7 +64,7 @@ fn read_flo(path: &Path) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
     let size_px = [side(words.next()), side(words.next())];
     let values: Vec<f32> = words.map(f32::from_le_bytes).collect();
     let pixels = u64::from(size_px[0]) * u64::from(size_px[1]);
-    if pixels == 0 || 2 * pixels != values.len() as u64 || bytes.len() % 4 != 0 {
+    if pixels == 0 || pixels.checked_mul(2) != Some(values.len() as u64) || bytes.len() % 4 != 0 {
         let [width, height] = size_px;
         return Err(failure(path, format!("says {width}x{height} pixels and holds {} numbers: it is cut off or damaged", values.len())));
     }

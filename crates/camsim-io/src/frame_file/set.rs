@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::{
     FrameFile, FrameFileError, FrameSpec,
     flow::read_flow,
+    images::{failure, is_exr},
     list::{Entry, frames},
     poses::read_poses,
     read_pictures, read_spec,
@@ -100,7 +101,17 @@ impl FrameSet {
             let message = format!("has {} frames; there is none of number {index}", self.entries.len());
             return Err(FrameFileError::Key { path: self.path.clone(), key: "frames", message });
         };
-        read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), self.motion(index)?, &self.path)
+        let file = read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), self.motion(index)?, &self.path)?;
+        if let (Moves::Flow(path), Motion::Flow(flow)) = (&self.moves, &file.motion) {
+            let [[w, h], [width, height]] = [flow.size_px, file.frame.geometry.size_px];
+            if [w, h] != [width, height] {
+                return Err(failure(
+                    path,
+                    format!("is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"),
+                ));
+            }
+        }
+        Ok(file)
     }
 
     fn stamp_s(&self, index: usize) -> Option<f64> {
@@ -179,12 +190,18 @@ fn check_flow(spec: &FrameSpec, several: bool, path: &Path) -> Result<(), FrameF
     if motion.flow_channels.as_ref().is_some_and(|names| names.len() != 2) {
         return fail("motion.flow_channels", "must be two names: the flow to the right, and down");
     }
+    if motion.flow_channels.is_some() && !motion.flow.as_deref().is_some_and(is_exr) {
+        return fail("motion.flow_channels", "is for EXR, and motion.flow is none; leave it out");
+    }
     if motion.flow_scale.is_some_and(|scale| !scale.iter().all(|part| part.is_finite() && *part != 0.0)) {
         return fail("motion.flow_scale", "must be two finite numbers that are not 0; [1, -1] where y is up");
     }
     match motion.flow_interval_ms {
         Some(ms) if ms.is_finite() && ms != 0.0 => Ok(()),
-        Some(_) => fail("motion.flow_interval_ms", "must be the time between the two instants that the flow joins, not 0"),
+        Some(_) => fail(
+            "motion.flow_interval_ms",
+            "must be a finite number of milliseconds that is not 0: the time between the two instants that the flow joins",
+        ),
         None => fail(
             "motion.flow_interval_ms",
             "is missing: give the time between the two instants that the flow joins, 1000 / fps for successive frames",

@@ -186,6 +186,10 @@ fn flo() -> Vec<u8> {
     head.into_iter().chain(numbers.flat_map(f32::to_le_bytes)).collect()
 }
 
+fn small_flo() -> Vec<u8> {
+    [202_021.25_f32.to_le_bytes(), 1_u32.to_le_bytes(), 2_u32.to_le_bytes(), [0; 4], [0; 4], [0; 4], [0; 4]].concat()
+}
+
 fn read_with_flow(text: &str, flow: &[u8]) -> Result<FrameFile, FrameFileError> {
     let (folder, path) = folder(&format!("{GOOD}[motion]\n{text}\n"));
     fs::write(folder.path().join("f.flo"), flow).unwrap();
@@ -226,14 +230,21 @@ fn flows_that_cannot_be_used_are_named() {
     for (text, bytes, wanted) in [
         ("flow = \"f.flo\"", flo(), "motion.flow_interval_ms: is missing"),
         ("flow = \"f.flo\"\nflow_interval_ms = 0", flo(), "not 0"),
+        ("flow = \"f.flo\"\nflow_interval_ms = nan", flo(), "must be a finite number"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_scale = [1e300, 1]", flo(), "f.flo: times motion.flow_scale"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_channels = [\"X\", \"Y\"]", flo(), "is for EXR"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3", small_flo(), "f.flo: is of 1x2 pixels, and the colour of 3x2"),
+        ("flow = \"two.exr\"\nflow_interval_ms = 3\nflow_channels = [\"X\", \"X\"]", flo(), "one channel X for both"),
+        ("flow = \"four.exr\"\nflow_interval_ms = 3\nflow_channels = [\"Vector.Z\", \"Z\"]", flo(), "one channel Vector.Z for both"),
         ("flow_interval_ms = 3", flo(), "is for motion.flow, which is missing"),
         ("flow = \"f.flo\"\nflow_interval_ms = 3\nvelocity_m_s = [1, 0, 0]", flo(), "leave twist, trajectory and stamp_s out"),
         ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_scale = [1, 0]", flo(), "motion.flow_scale"),
-        ("flow = \"f.flo\"\nflow_interval_ms = 3\nflow_channels = [\"X\"]", flo(), "two names"),
+        ("flow = \"two.exr\"\nflow_interval_ms = 3\nflow_channels = [\"X\"]", flo(), "two names"),
         ("flow = \"no.flo\"\nflow_interval_ms = 3", flo(), "no.flo: cannot be read"),
         ("flow = \"c.png\"\nflow_interval_ms = 3", flo(), "c.png: is no Middlebury .flo file"),
         ("flow = \"f.flo\"\nflow_interval_ms = 3", flo()[..40].to_vec(), "f.flo: says 3x2 pixels and holds 7 numbers"),
         ("flow = \"f.flo\"\nflow_interval_ms = 3", [&flo()[..12], &[0xff; 48]].concat(), "no pixel whose flow is known"),
+        ("flow = \"f.flo\"\nflow_interval_ms = 3", [&flo()[..4], &[0xff; 8]].concat(), "says 4294967295x4294967295 pixels and holds 0"),
         ("flow = \"four.exr\"\nflow_interval_ms = 3", flo(), "motion.flow_channels which two"),
         ("flow = \"four.exr\"\nflow_interval_ms = 3\nflow_channels = [\"X\", \"Q\"]", flo(), "has no channel Q"),
     ] {
