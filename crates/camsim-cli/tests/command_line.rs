@@ -191,7 +191,12 @@ fn the_built_in_flight_is_tracked_and_explained() {
     let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
     assert_eq!((explained["plan"]["frame"].as_u64(), explained["frames"].as_u64()), (Some(3), Some(60)));
     let (code, out, _) = camsim(["explain", text(&scenario), "--set", "camera.shutter.exposure_ms=0"]);
-    assert!(code == 0 && out.contains("skipped"), "{out}");
+    assert!(code == 0 && out.contains("skipped") && !out.contains("light:"), "{out}");
+    let (code, out, err) = camsim(["explain", text(&scenario), "--set", "scene.light.sun=0.7"]);
+    assert!(code == 0 && out.contains("light: sun 0.7 from 180 deg") && !out.contains("ground's picture"), "{out}");
+    assert!(err.contains("scene.light changes nothing"), "{err}");
+    let (code, out, err) = camsim(["explain", text(&assets().join("demo.toml")), "--set", "scene.light.sun=0.7"]);
+    assert!(code == 0 && out.contains("in steps of 8 bits") && !err.contains("changes nothing"), "{out} {err}");
 }
 
 #[test]

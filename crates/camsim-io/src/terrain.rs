@@ -62,6 +62,8 @@ pub struct TerrainSummary {
     pub void_heights: u64,
     /// Heights that lie outside of the ortho-image; they get the colour of its border.
     pub outside_ortho: u64,
+    /// How many times finer along each side the picture was made, so that it holds the light on each height; 1 without light.
+    pub picture_times: u32,
 }
 
 /// Why a terrain cannot be read.
@@ -232,10 +234,8 @@ pub fn read_terrain_in_light(
     if let Some(ortho) = spec.ortho.as_ref().filter(|_| outside_ortho == dem.points()) {
         return Err(TerrainFileError::NoOverlap { ortho: ortho.clone(), dem: dem.path.clone() });
     }
-    if let Some(light) = light {
-        terrain.light_up(light);
-    }
-    let summary = grid.summary(&heights, outside_ortho);
+    let picture_times = light.map_or(1, |light| terrain.light_up(light));
+    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, outside_ortho) };
     Ok(LoadedTerrain { terrain, summary })
 }
 
@@ -294,6 +294,7 @@ impl Grid<'_> {
             height_range_m: heights.range_m,
             void_heights: heights.voids,
             outside_ortho,
+            picture_times: 1,
         }
     }
 }

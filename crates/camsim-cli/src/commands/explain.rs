@@ -2,7 +2,7 @@
 
 use camsim_core::{
     plan::{FramePlan, PlanSummary, Planner},
-    scenario::{Auto, Solver},
+    scenario::{Auto, LightSpec, Solver},
     scene::{self, GroundTiles, ModelDetail, SceneLevels, TerrainDetail, TexelForm, tile_bytes},
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
@@ -154,6 +154,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if let Some(terrain) = &terrain {
         print_terrain(terrain, console)?;
     }
+    print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {
@@ -240,6 +241,26 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
         "  {voids} heights missing, {outside} outside of the ortho-image, {} triangles at the finest level",
         terrain.finest_triangles
     ))?;
+    Ok(())
+}
+
+/// What light does, and what of it no figure below counts.
+fn print_light(loaded: &Loaded, console: &mut Console<'_>) -> Result<(), Failure> {
+    let Some(light) = &loaded.sequence.scenario.scene.light else { return Ok(()) };
+    let LightSpec { sun_azimuth_deg, sun_elevation_deg, sun, sky } = light;
+    let from = format!("light: sun {sun} from {sun_azimuth_deg} deg east of north, {sun_elevation_deg} deg high, and sky {sky}");
+    let ground = match (&loaded.terrain, &loaded.sequence.scene.terrain) {
+        (Some(summary), Some(terrain)) => {
+            let [width, height] = terrain.texture.size_px;
+            let finer = match summary.picture_times {
+                1 => String::new(),
+                times => format!(", made {times} times finer for it"),
+            };
+            format!("; in the ground's picture of {width}x{height} px{finer}, in steps of 8 bits that no error below counts")
+        }
+        _ => String::new(),
+    };
+    console.line(format_args!("{from}{ground}"))?;
     Ok(())
 }
 

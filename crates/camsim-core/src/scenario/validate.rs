@@ -374,6 +374,8 @@ mod tests {
             ("scene.sky", |s| s.scene.sky = [166.0, 217.0, 255.0]),
             ("scene.fog_visibility_m", |s| s.scene.fog_visibility_m = Some(0.0)),
             ("scene.light.sun_azimuth_deg", |s| s.scene.light = Some(LightSpec { sun_azimuth_deg: f64::INFINITY, ..Default::default() })),
+            ("scene.light.sun_azimuth_deg", |s| s.scene.light = Some(LightSpec { sun_azimuth_deg: 1e300, ..Default::default() })),
+            ("scene.light.sun", |s| s.scene.light = Some(LightSpec { sun: 1.1, ..Default::default() })),
             ("scene.light.sun_elevation_deg", |s| s.scene.light = Some(LightSpec { sun_elevation_deg: -1.0, ..Default::default() })),
             ("scene.light.sun", |s| s.scene.light = Some(LightSpec { sun: f64::NAN, ..Default::default() })),
             ("scene.light.sky", |s| s.scene.light = Some(LightSpec { sun: 0.8, sky: 0.3, ..Default::default() })),

@@ -52,6 +52,9 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         scene.meshes.push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
     }
     let mut notes = Vec::new();
+    if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
+        notes.push("scene.light changes nothing: it falls on terrain and models, of which the scene has none; patterns and boards keep their colours".to_owned());
+    }
     for spec in &spec.gltf {
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
     }

@@ -45,7 +45,9 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
 }
 
 fn check_light(check: &mut Check, light: &LightSpec) {
-    check.finite("scene.light.sun_azimuth_deg", &[light.sun_azimuth_deg]);
+    check.require(light.sun_azimuth_deg.abs() <= 360.0, "scene.light.sun_azimuth_deg", || {
+        format!("must be -360 to 360, from north to east, not {}", light.sun_azimuth_deg)
+    });
     check.require((0.0..=90.0).contains(&light.sun_elevation_deg), "scene.light.sun_elevation_deg", || {
         format!(
             "must be 0 (on the horizon) to 90 (overhead), not {}; for a night leave the sun out: scene.light.sun = 0",
@@ -56,11 +58,11 @@ fn check_light(check: &mut Check, light: &LightSpec) {
         check.require((0.0..=1.0).contains(&share), key, || format!("must be 0 to 1 of a colour, not {share}"));
     }
     // Not more than white; a brighter day is the camera's matter. A hair for sums like 0.7 + 0.3.
-    check.require(light.sun.is_nan() || light.sky.is_nan() || light.sun + light.sky <= 1.0 + 1e-9, "scene.light.sky", || {
-        format!(
-            "and scene.light.sun are {} together, and must be at most 1; camera.photometric.light makes pictures brighter",
-            light.sun + light.sky
-        )
+    // Each by itself has been told.
+    let both = light.sun + light.sky;
+    let each = [light.sun, light.sky].iter().all(|share| (0.0..=1.0).contains(share));
+    check.require(!each || both <= 1.0 + 1e-9, "scene.light.sky", || {
+        format!("makes {both} with scene.light.sun, and both together must be at most 1; camera.photometric.light makes pictures brighter")
     });
 }
 

@@ -22,13 +22,14 @@ const MOST_TEXELS: u32 = 1 << 14;
 
 impl Terrain {
     /// Multiplies the picture by the light on the ground. It is made finer first where it has less than a texel for each height, so that the
-    /// light has all of the DEM's detail.
-    pub fn light_up(&mut self, light: &Light) {
+    /// light has all of the DEM's detail; gives how many times along each side.
+    pub fn light_up(&mut self, light: &Light) -> u32 {
         let ground = Ground::new(self, light);
         let times = ground.times(self.texture.size_px);
         let mut texture = if times > 1 { finer(&self.texture, times) } else { Texture::clone(&self.texture) };
         ground.paint(&mut texture);
         self.texture = Arc::new(texture);
+        times
     }
 }
 

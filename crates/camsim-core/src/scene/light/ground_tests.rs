@@ -23,8 +23,8 @@ fn a_tilted_plane_has_one_colour_to_its_border() {
     let factor = sun().on(upwards);
     assert!((factor - (0.75 * upwards.dot(sun().to_sun_ned) + 0.125 * (1.0 - upwards.z))).abs() < 1e-12);
     let mut terrain = Terrain::from_heights(90, 70, 10.0, &heights, uniform([200, 100, 5, 77], Encoding::Linear)).unwrap();
-    terrain.light_up(&sun());
     // A texel for each height, of a picture that had one in all.
+    assert_eq!(terrain.light_up(&sun()), 90);
     assert_eq!(terrain.texture.size_px, [90, 90]);
     for pixel in terrain.texture.rgba8.chunks_exact(4) {
         for (byte, before) in pixel.iter().zip([200.0, 100.0, 5.0]) {
