@@ -260,8 +260,13 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgp
             fix: "reduce the picture",
         });
     }
-    let mips = texture.mips(gpu.texels);
-    let mut data = texture.texels(&texture.rgba8, gpu.texels).into_owned();
+    let form = match (texture.encoding, texture.size_px) {
+        // Every device has the exact light of these bytes, and there are no smaller versions: a half would only round.
+        (Encoding::Linear, [1, 1]) => TexelForm::Stored,
+        _ => gpu.texels,
+    };
+    let mips = texture.mips(form);
+    let mut data = texture.texels(&texture.rgba8, form).into_owned();
     mips.iter().for_each(|mip| data.extend_from_slice(&mip.texels));
     let on_device = gpu.device.create_texture_with_data(
         &gpu.queue,
@@ -271,7 +276,7 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgp
             mip_level_count: mips.len() as u32 + 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: texture_format(texture.encoding, gpu.texels),
+            format: texture_format(texture.encoding, form),
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         },
