@@ -54,12 +54,12 @@ impl Motion {
         }
     }
 
-    /// Whether the camera may change its place, so that depth matters; of a table that is taken for granted. A flow says it all without.
+    /// Whether the camera changes its place, so that depth matters. A flow says it all without.
     #[must_use]
     pub fn translates(&self) -> bool {
         match self {
             Self::Twist(twist) => twist.velocity_m_s != DVec3::ZERO,
-            Self::Poses(_) => true,
+            Self::Poses(track) => track.translates(),
             Self::Flow(_) => false,
         }
     }
@@ -174,6 +174,11 @@ impl PoseTrack {
             row.world_from_camera = row.world_from_camera.normalize();
         }
         Ok(Self { rows })
+    }
+
+    /// Positions are about the first.
+    fn translates(&self) -> bool {
+        self.rows.iter().any(|row| row.position_m != DVec3::ZERO)
     }
 
     fn covers(&self, first: f64, last: f64) -> Result<(), PoseTrackError> {

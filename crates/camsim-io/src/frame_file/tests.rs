@@ -59,6 +59,12 @@ fn every_key_is_taken() {
     assert_eq!(twist, Twist { velocity_m_s: DVec3::X, rate_rad_s: DVec3::ZERO });
     // Rotation alone needs no depth.
     assert_eq!(read("color = \"c.png\"\nfocal_px = [2, 2]\n").unwrap().frame.inverse_depth, [0.0; 6]);
+    let by_table = "color = \"c.png\"\nfocal_px = [2, 2]\n[motion]\ntrajectory = \"p.csv\"\nstamp_s = 10.5\n";
+    let (folder, path) = folder(by_table);
+    let error = read_frame(&path).unwrap_err().to_string();
+    assert!(error.contains("depth: is missing, and the camera moves"), "{error}");
+    fs::write(folder.path().join("p.csv"), "t_s,x,y,z,qx,qy,qz,qw\n10,1,2,3,0,0,0,1\n11,1,2,3,0,0,1,0\n").unwrap();
+    assert_eq!(read_frame(&path).unwrap().frame.inverse_depth, [0.0; 6]);
 }
 
 #[test]
