@@ -325,7 +325,8 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
-    let Predicted { resampling_dn, blur_dn, holes, .. } = predicted;
+    let Predicted { resampling_dn, blur_dn, layers, holes, .. } = predicted;
+    let layers_dn = layers.map_or(0.0, |layers| layers.error_dn);
     let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.4} %", 100.0 * holes.share));
     console.line(format_args!(
         "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
@@ -341,7 +342,7 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
         let verdict = if *kept { "kept" } else { "BROKEN" };
         console.line(format_args!(
             "       | {where_} {rms_dn:.2}/255 (RMS), predicted {predicted_dn:.2}: quality.max_error_dn is {verdict}; without silhouettes predicted {}",
-            estimate(resampling_dn.hypot(*blur_dn))
+            estimate(resampling_dn.hypot(*blur_dn).hypot(layers_dn))
         ))?;
     }
     Ok(())

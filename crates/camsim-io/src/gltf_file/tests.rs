@@ -346,7 +346,7 @@ fn what_is_blended_is_mixed_where_any_of_it_is_clear() {
     let of = |mode: &str, alpha: f32| {
         let factor = format!(r#""pbrMetallicRoughness": {{ "baseColorFactor": [1, 1, 1, {alpha}] }}"#);
         let found = material_of(&format!(r#"{{ "alphaMode": "{mode}", {factor} }}"#));
-        (found.blends, found.cutoff)
+        (found.blends, found.cutoff.map(|alpha| alpha / super::material::AT_CUTOFF))
     };
     assert_eq!([of("BLEND", 0.5), of("BLEND", 0.999)], [(true, Some(0.5)); 2]);
     // Nothing is clear: it hides what is behind it.
@@ -360,7 +360,10 @@ fn a_real_model_blends_what_it_says() {
     let Some(data) = data() else { return };
     let model = read_gltf(&data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"), GltfOptions::default()).unwrap();
     assert!(model.notes.is_empty(), "{:?}", model.notes);
-    let found: Vec<_> = model.place(DVec3::ZERO, 0.0, 1.0).map(|mesh| (mesh.material.blends, mesh.material.cutoff)).collect();
+    let found: Vec<_> = model
+        .place(DVec3::ZERO, 0.0, 1.0)
+        .map(|mesh| (mesh.material.blends, mesh.material.cutoff.map(|alpha| alpha / super::material::AT_CUTOFF)))
+        .collect();
     for wanted in [(true, Some(0.5)), (false, None), (false, Some(0.25)), (false, Some(0.5)), (false, Some(0.75))] {
         assert!(found.contains(&wanted), "{wanted:?} of {found:?}");
     }
