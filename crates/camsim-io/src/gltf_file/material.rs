@@ -13,7 +13,7 @@ use super::{GltfError, emitted, source::Source};
 /// From this alpha on a blended surface has depth: a pixel has one, that of the surface most of its light is of.
 const BLEND_CUTOFF: f32 = 0.5;
 /// What has just the alpha of the cut-off is there: it must not be left to what corners' alphas, or half floats of a picture's, round to.
-pub(super) const AT_CUTOFF: f32 = 1.0 - 5e-4;
+const AT_CUTOFF: f32 = 1.0 - 5e-4;
 
 /// How a primitive's corners meet its picture.
 #[derive(Clone, Copy, Debug)]
@@ -112,11 +112,11 @@ impl<'a> Materials<'a> {
             (None, Some(info)) => self.textured(info, has_alpha && !(emits && black), &mut rule)?,
         };
         let cutoff = match material.alpha_mode() {
-            AlphaMode::Opaque => None::<f32>,
+            AlphaMode::Opaque => None,
             AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
             AlphaMode::Blend => Some(BLEND_CUTOFF),
         };
-        let cutoff = cutoff.map(|alpha| AT_CUTOFF * alpha);
+        let cutoff = cutoff.map(|alpha: f32| AT_CUTOFF * alpha);
         let blends = material.alpha_mode() == AlphaMode::Blend;
         let made = Material { texture, wrap, nearest, emissive, cutoff, blends, one_sided: !material.double_sided() };
         self.known.insert(material.index(), (made.clone(), rule));

@@ -341,17 +341,23 @@ fn material_of(material: &str) -> Material {
     model.place(DVec3::ZERO, 0.0, 1.0).next().unwrap().material
 }
 
+/// What cuts at an alpha: just below it, as what has that alpha is there, of which a half float that is rounded down loses up to 2^-11; and no lower.
+fn cut_at(alpha: f32, cutoff: Option<f32>) -> bool {
+    cutoff.is_some_and(|cutoff| cutoff < alpha * (1.0 - 0.5_f32.powi(11)) && cutoff > 0.999 * alpha)
+}
+
 #[test]
 fn what_is_blended_is_mixed_where_any_of_it_is_clear() {
     let of = |mode: &str, alpha: f32| {
         let factor = format!(r#""pbrMetallicRoughness": {{ "baseColorFactor": [1, 1, 1, {alpha}] }}"#);
         let found = material_of(&format!(r#"{{ "alphaMode": "{mode}", {factor} }}"#));
-        (found.blends, found.cutoff.map(|alpha| alpha / super::material::AT_CUTOFF))
+        (found.blends, found.cutoff)
     };
-    assert_eq!([of("BLEND", 0.5), of("BLEND", 0.999)], [(true, Some(0.5)); 2]);
+    let is = |found: (bool, Option<f32>), blends: bool| found.0 == blends && cut_at(0.5, found.1);
+    assert!(is(of("BLEND", 0.5), true) && is(of("BLEND", 0.999), true));
     // Nothing is clear: it hides what is behind it.
     assert_eq!(of("BLEND", 1.0), (false, None));
-    assert_eq!([of("MASK", 0.4), of("MASK", 1.0)], [(false, Some(0.5)); 2]);
+    assert!(is(of("MASK", 0.4), false) && is(of("MASK", 1.0), false));
     assert_eq!(of("OPAQUE", 0.4), (false, None));
 }
 
@@ -360,11 +366,9 @@ fn a_real_model_blends_what_it_says() {
     let Some(data) = data() else { return };
     let model = read_gltf(&data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"), GltfOptions::default()).unwrap();
     assert!(model.notes.is_empty(), "{:?}", model.notes);
-    let found: Vec<_> = model
-        .place(DVec3::ZERO, 0.0, 1.0)
-        .map(|mesh| (mesh.material.blends, mesh.material.cutoff.map(|alpha| alpha / super::material::AT_CUTOFF)))
-        .collect();
-    for wanted in [(true, Some(0.5)), (false, None), (false, Some(0.25)), (false, Some(0.5)), (false, Some(0.75))] {
-        assert!(found.contains(&wanted), "{wanted:?} of {found:?}");
+    let found: Vec<_> = model.place(DVec3::ZERO, 0.0, 1.0).map(|mesh| (mesh.material.blends, mesh.material.cutoff)).collect();
+    for (blends, alpha) in [(true, 0.5), (false, 0.25), (false, 0.5), (false, 0.75)] {
+        assert!(found.iter().any(|found| found.0 == blends && cut_at(alpha, found.1)), "{blends} {alpha} of {found:?}");
     }
+    assert!(found.contains(&(false, None)), "{found:?}");
 }
