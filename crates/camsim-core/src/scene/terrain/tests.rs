@@ -215,3 +215,31 @@ fn one_large_chunk_rounds_all_positions() {
     assert_eq!(terrain.position_ned_m(chunk, i, j), at);
     assert!((27.0..31.0).contains(&(terrain.host_bytes() as f64 / f64::from(side * side))), "{}", terrain.host_bytes());
 }
+
+#[test]
+fn parts_of_the_border_tell_what_all_its_sides_do() {
+    let mut random = Random(37);
+    let mut found = [0, 0];
+    for bend_m in [0.0, 40.0, -25.0] {
+        // Sides bulge or cave in; 3 x 2 chunks and some.
+        let (cols, rows) = (64 * 3 + 20, 64 * 2 + 5);
+        let uvs = vec![[0.0; 2]; (cols * rows) as usize];
+        let points: Vec<DVec3> = (0..cols * rows)
+            .map(|k| {
+                let [i, j] = [f64::from(k % cols) / f64::from(cols - 1), f64::from(k / cols) / f64::from(rows - 1)];
+                let bulge = |t: f64| bend_m * (std::f64::consts::PI * t).sin();
+                DVec3::new((0.5 - j) * (1300.0 + 2.0 * bulge(i)), (i - 0.5) * (2100.0 + 2.0 * bulge(j)), 0.0)
+            })
+            .collect();
+        let texture = Arc::new(crate::scene::Texture::uniform([255; 4], crate::scene::Encoding::Srgb));
+        let terrain = Terrain::new(cols, rows, &points, &uvs, texture).unwrap();
+        for _ in 0..400 {
+            let place = glam::DVec2::new(random.within(-700.0, 700.0), random.within(-1150.0, 1150.0));
+            let turns: Vec<f64> = (0..terrain.border_sides()).map(|side| terrain.side_turn(side, place)).collect();
+            let all = turns.iter().all(|&turn| turn > 0.0) || turns.iter().all(|&turn| turn < 0.0);
+            assert_eq!(terrain.border_faces_away_from(place.extend(-500.0)), all, "{place} {bend_m}");
+            found[usize::from(all)] += 1;
+        }
+    }
+    assert!(found[0] > 150 && found[1] > 300, "{found:?}");
+}
