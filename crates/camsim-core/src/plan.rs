@@ -46,6 +46,7 @@ mod rounding;
 mod sharing;
 mod sight;
 mod stages;
+mod stairs;
 mod surfaces;
 pub(crate) mod transfer;
 

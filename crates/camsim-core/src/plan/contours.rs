@@ -14,11 +14,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    Holes, LensReach,
-    borders::{Crossed, stairs},
+    BlurStage, Holes, LensReach,
+    borders::Crossed,
     edges::MOST_FINE,
+    levels::{Sampling, sample_count},
     probes::Probe,
     prospect::path_px,
+    stairs::{self, Reading},
     surfaces::Surfaces,
 };
 use crate::{
@@ -26,10 +28,13 @@ use crate::{
     pose::CameraPose,
     shutter::Shutter,
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
+    temporal::Footprint,
 };
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
-const SAFETY: f64 = 1.2;
+const SAFETY: f64 = 1.3;
+/// Times what is found at borders, squared, at most, that is taken to lie between those.
+const MOST_FINER: f64 = 2.0;
 /// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
 const STRIPS: f64 = 2.0;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
@@ -37,6 +42,10 @@ const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
 /// Part of what stairs cost, squared, that rays leave of it.
 const RAYS_LEAVE: f64 = 0.42;
+/// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
+const LEAST_LEFT: f64 = 0.1;
+/// Steps of a doubling that widths and paths of pixels with borders are told apart by.
+const STEPS_ALIKE: f64 = 3.0;
 /// Price of marks, samples and rays for a picture that is all silhouettes, bilinear reads of an output pixel: from frame times on llvmpipe. So much more
 /// for ideal frames of more pixels, and by fine pixels along a side of each.
 const RAYS_PRICE: f64 = 1900.0;
@@ -75,24 +84,38 @@ pub(super) struct Search<'a> {
 /// What is seen around a probe.
 pub(super) struct Around {
     contour: Option<Contour>,
+    /// Side of the pixel and path over the exposure, pixels of the camera's focal length; where there is a border.
+    sides_px: Option<[f64; 2]>,
     /// What is found pixel by pixel, where models may be thinner than the places of that look.
     crossed: Crossed,
     /// Whether there is a step or a fold of depth.
     pub is_beside: bool,
 }
 
-/// The same for ideal frames of any scale.
-#[derive(Clone, Copy, Debug)]
+/// The same for ideal frames of any scale, and all that may read them.
+#[derive(Clone, Debug)]
 pub(super) struct Outlook {
     share: f64,
     contrast_dn: f64,
     hidden_share: f64,
-    /// Mean squared errors over the picture, of the linear range: by stairs at the camera's own scale, and by strips.
-    squares: [f64; 2],
-    /// By borders between meshes that touch, at the camera's own scale.
+    /// Mean squared error over the picture by strips, of the linear range.
+    strips: f64,
+    /// Squared contrast of borders, times their length in pixels, mean over the pixels of the picture: of steps of depth,
+    steps: f64,
+    /// between meshes that touch,
     flush: f64,
-    /// By those where depth bends.
+    /// and where depth bends.
     feet: f64,
+    places: Vec<Place>,
+}
+
+/// Pixels with borders that are alike.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Part of all that have borders, by squared contrast.
+    part: f64,
+    /// Side of the pixel and path over the exposure, pixels of the camera's focal length.
+    sides_px: [f64; 2],
 }
 
 /// One probe near a silhouette.
@@ -104,9 +127,9 @@ struct Contour {
 }
 
 impl Contour {
-    /// Squared error, mean over the pixels within reach, of a border along whole pixels of the camera's size: of one border.
-    fn stairs(&self) -> f64 {
-        SAFETY * SAFETY * stairs(self.contrast2 / f64::from(2 * NEAR_PX + 1), self.path_px)
+    /// Squared contrast times the length of the border in each of the pixels within reach.
+    fn steps(&self) -> f64 {
+        self.contrast2 / f64::from(2 * NEAR_PX + 1)
     }
 
     /// The same of the strip within parallax: narrower than a pixel it is as much less of one, and the exposure spreads it over its path.
@@ -128,15 +151,28 @@ impl Outlook {
         let over_all = |of: &dyn Fn(&Crossed) -> f64| {
             SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
         };
-        let stairs = (share * mean(&Contour::stairs)).max(over_all(&|crossed| crossed.stairs));
+        let finer = finer(around);
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
-            squares: [stairs, STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip)],
-            flush: over_all(&|crossed| crossed.flush),
-            feet: over_all(&|crossed| crossed.feet),
+            strips: STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip),
+            steps: (SAFETY * SAFETY * share * mean(&Contour::steps)).max(finer * over_all(&|crossed| crossed.steps)),
+            flush: finer * over_all(&|crossed| crossed.flush),
+            feet: finer * over_all(&|crossed| crossed.feet),
+            places: places(around),
         }
+    }
+
+    /// What reads of an ideal frame leave of borders, for a squared contrast of 1 times their length in each pixel.
+    fn left(&self, sampling: &Sampling, blur: Option<BlurStage>) -> f64 {
+        let of = |place: &Place| {
+            let [width_px, path_px] = place.sides_px.map(|px| sampling.scale * px);
+            let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, sampling.taps);
+            let exposure = blur.map(|blur| (path_px, sample_count(&blur, path_px, &area)));
+            place.part * stairs::left(&Reading { width_px, taps: sampling.taps, exposure })
+        };
+        self.places.iter().map(of).sum()
     }
 
     /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel, with so many ideal pixels for each of the
@@ -146,17 +182,32 @@ impl Outlook {
         RAYS_PRICE * self.share * (1.0 + MORE_FOR_SCALE * (scale * scale - 1.0)) * times
     }
 
-    /// Left as they are, with so many ideal pixels for each of the camera's.
-    pub fn plain(&self, scale: f64) -> Contours {
-        self.of((self.squares[0] + self.flush + self.feet) / (scale * scale) + self.squares[1])
+    /// Left as they are.
+    pub fn plain(&self, sampling: &Sampling, blur: Option<BlurStage>) -> Contours {
+        self.of((self.steps + self.flush + self.feet) * self.left(sampling, blur) + self.strips)
+    }
+
+    /// Not more than what they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's.
+    pub fn plain_at_best(&self, scale: f64) -> Contours {
+        self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.along_whole_pixels(scale) + self.strips)
     }
 
     /// With rays of their own: a border is known to a part of a fine pixel.
-    pub fn with_rays(&self, scale: f64, fine: u32) -> Contours {
-        let as_they_are = (scale * scale).recip();
-        let through_samples = RAYS_LEAVE * as_they_are / f64::from(fine * fine);
+    pub fn with_rays(&self, sampling: &Sampling, blur: Option<BlurStage>, fine: u32) -> Contours {
+        let as_they_are = self.left(sampling, blur);
+        let through_samples = RAYS_LEAVE * self.along_whole_pixels(sampling.scale) / f64::from(fine * fine);
         let of_feet = if fine > 1 { through_samples } else { as_they_are };
-        self.of(through_samples * self.squares[0] + as_they_are * self.flush + of_feet * self.feet)
+        self.of(through_samples * self.steps + as_they_are * self.flush + of_feet * self.feet)
+    }
+
+    /// Squared error of borders along whole pixels of an ideal frame, as [`Outlook::left`] has it for what reads it.
+    ///
+    /// Where the border truly is within such a pixel is any place alike, so that one pixel of each line across has 1/12 of the squared
+    /// contrast. The path over the exposure spreads that over its length, as many times less of the contrast in as many times more pixels;
+    /// half of that, since many paths run along the border.
+    fn along_whole_pixels(&self, scale: f64) -> f64 {
+        let of = |place: &Place| place.part / (12.0 * scale * scale * (1.0 + place.sides_px[1]).sqrt());
+        self.places.iter().map(of).sum()
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -165,6 +216,30 @@ impl Outlook {
         let at_dn = if share > 0.0 { error_dn / share.sqrt() } else { 0.0 };
         Contours { share, contrast_dn, hidden_share, at_dn, error_dn }
     }
+}
+
+/// Times the borders that are found there are more, nearer to each other than what is looked at: as many times as what is found thrice a pixel is more
+/// than what is found once.
+fn finer(around: &[Around]) -> f64 {
+    let of = |Crossed { steps, flush, feet, once_a_pixel, .. }: &Crossed| [steps + flush + feet, *once_a_pixel];
+    let [all, once] = around.iter().map(|around| of(&around.crossed)).fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    if once > 0.0 { (all / once).clamp(1.0, MOST_FINER) } else { 1.0 }
+}
+
+/// Pixels with borders, those that are alike together.
+fn places(around: &[Around]) -> Vec<Place> {
+    let alike = |sides_px: [f64; 2]| sides_px.map(|px| (STEPS_ALIKE * (1.0 + px).log2()).round() as i64);
+    let mut found: Vec<([i64; 2], Place)> = Vec::new();
+    for around in around {
+        let Around { contour, crossed: Crossed { steps, flush, feet, .. }, sides_px: Some(sides_px), .. } = around else { continue };
+        let part = contour.as_ref().map_or(0.0, Contour::steps).max(*steps) + flush + feet;
+        match found.iter_mut().find(|(key, _)| *key == alike(*sides_px)) {
+            Some((_, place)) => place.part += part,
+            None => found.push((alike(*sides_px), Place { part, sides_px: *sides_px })),
+        }
+    }
+    let all: f64 = found.iter().map(|(_, place)| place.part).sum();
+    found.into_iter().map(|(_, place)| Place { part: place.part / all.max(1e-30), ..place }).collect()
 }
 
 impl Contours {
@@ -217,13 +292,19 @@ impl Search<'_> {
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
         // Between places 3 px apart a crease bends threefold.
         let is_fold = |line: &[usize; 3]| bends(line.map(|i| inverse_depth[i]), f64::from(NEAR_PX) * FOLD);
-        let contour = (!across.is_empty()).then(|| Contour {
+        let crossed = if self.surfaces.has_models() { self.crossed(probe) } else { Crossed::default() };
+        let has_border = !across.is_empty() || crossed.steps + crossed.flush + crossed.feet > 0.0;
+        let focal_px = self.reach.camera.focal_px;
+        let sides_px = has_border.then(|| {
+            let path = path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], focal_px);
+            [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.1]
+        });
+        let contour = sides_px.filter(|_| !across.is_empty()).map(|[_, path_px]| Contour {
             strip_px: across.iter().map(strip_px).fold(0.0, f64::max),
             contrast2: (self.gain)(probe.pixel).powi(2) * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
-            path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], self.reach.camera.focal_px).1,
+            path_px,
         });
-        let crossed = if self.surfaces.has_models() { self.crossed(probe) } else { Crossed::default() };
-        Around { is_beside: contour.is_some() || crossed.borders > 0 || LINES.iter().any(is_fold), contour, crossed }
+        Around { is_beside: contour.is_some() || crossed.borders > 0 || LINES.iter().any(is_fold), contour, sides_px, crossed }
     }
 }
 
@@ -238,9 +319,11 @@ mod tests {
     use super::*;
     use crate::{
         camera::CameraModel,
+        plan::{SurfaceReads, exposure::ExposurePath},
         pose::BodyState,
         scenario::{LensModel, MountSpec, ShutterSpec},
         scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
+        temporal::TapStage,
         trajectory::Trajectory,
     };
 
@@ -254,6 +337,11 @@ mod tests {
 
     fn plain(byte: u8) -> Arc<Texture> {
         Arc::new(Texture::uniform([byte, byte, byte, 255], Encoding::Linear))
+    }
+
+    /// An ideal frame of a scale, read bilinearly at the mid-exposure.
+    fn read_at(scale: f64) -> Sampling {
+        Sampling::new(scale, SurfaceReads::Two, TapStage::Bilinear)
     }
 
     /// The same with something else above black ground.
@@ -284,11 +372,11 @@ mod tests {
 
     #[test]
     fn a_roof_has_its_border_and_contrast() {
-        let found = outlook(0.0, 1.0, Holes::default()).plain(1.0);
+        let found = outlook(0.0, 1.0, Holes::default()).plain(&read_at(1.0), None);
         // 100 px a side: a band of 6 px along 400 px, of 120 000.
         assert!((found.share / 0.02 - 1.0).abs() < 0.5, "{found:?}");
         assert!((found.contrast_dn - 255.0).abs() < 1e-3, "{found:?}");
-        let half = outlook(0.0, 0.5, Holes::default()).plain(1.0);
+        let half = outlook(0.0, 0.5, Holes::default()).plain(&read_at(1.0), None);
         assert_eq!((half.contrast_dn, half.error_dn), (0.5 * found.contrast_dn, 0.5 * found.error_dn));
     }
 
@@ -307,9 +395,9 @@ mod tests {
         }
         let comb = Mesh::new(vertices, indices, plain(255), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp);
         let found = outlook_on(vec![comb], 0.0, 1.0, Holes::default());
-        // Two borders in 8 px, each with 1/12 of the squared contrast in one pixel across.
-        let expected = SAFETY * SAFETY * 2.0 / 8.0 / 12.0;
-        assert!((found.squares[0] / expected - 1.0).abs() < 0.1, "{} {expected}", found.squares[0]);
+        // Two borders in 8 px.
+        let expected = SAFETY * SAFETY * 2.0 / 8.0;
+        assert!((found.steps / expected - 1.0).abs() < 0.1, "{} {expected}", found.steps);
         assert!(found.share > 0.99, "{}", found.share);
         assert_eq!(found.flush, 0.0);
     }
@@ -330,24 +418,32 @@ mod tests {
             Mesh::new(vertices, indices, plain(byte), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp)
         };
         let found = outlook_on(vec![stripes(255, 0), stripes(0, 1)], 0.0, 1.0, Holes::default());
-        let expected = SAFETY * SAFETY / 4.0 / 12.0;
+        // Lines along two directions alone cross what runs between these too often.
+        let expected = SAFETY * SAFETY / 4.0 * std::f64::consts::FRAC_PI_2 * (0.6 + 0.8) / 2.0;
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
-        assert_eq!(found.squares[0], 0.0);
-        let [plain, rays] = [found.plain(2.0), found.with_rays(2.0, 2)].map(|of| of.error_dn);
-        assert!((plain - rays).abs() < 1e-9 && (plain - 127.5 * found.flush.sqrt()).abs() < 1e-9, "{plain} {rays}");
+        assert_eq!(found.steps, 0.0);
+        let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2)].map(|of| of.error_dn);
+        let left = stairs::left(&Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
+        assert!((plain - rays).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
     }
 
     #[test]
     fn finer_samples_find_the_feet_of_walls() {
-        let feet = Outlook { share: 0.5, contrast_dn: 100.0, hidden_share: 0.0, squares: [0.0; 2], flush: 0.0, feet: 1e-4 };
-        let [plain, middles, thirds] = [feet.plain(2.0), feet.with_rays(2.0, 1), feet.with_rays(2.0, 3)].map(|of| of.error_dn);
-        assert_eq!(plain, middles);
-        assert!((thirds / plain - RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{plain} {thirds}");
+        let places = vec![Place { part: 1.0, sides_px: [1.0, 0.0] }];
+        let feet = Outlook { share: 0.5, contrast_dn: 100.0, hidden_share: 0.0, strips: 0.0, steps: 0.0, flush: 0.0, feet: 1e-3, places };
+        let with_rays = |fine: u32| feet.with_rays(&read_at(2.0), None, fine).error_dn;
+        assert_eq!(with_rays(1), feet.plain(&read_at(2.0), None).error_dn);
+        // Of 1/12 in a pixel's width, in pixels half as wide.
+        let along_whole_pixels = 255.0 * (1e-3_f64 / 12.0).sqrt() / 2.0;
+        assert!((with_rays(3) / along_whole_pixels - RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{}", with_rays(3));
     }
 
     #[test]
     fn strips_are_those_within_parallax_and_those_that_are_hidden() {
-        let outlook_of = |holes| outlook(0.0, 1.0, holes).plain(f64::INFINITY);
+        let outlook_of = |holes| {
+            let found = outlook(0.0, 1.0, holes);
+            found.of(found.strips)
+        };
         let found = outlook_of(Holes::default());
         // At the roof's two borders across the flight 50 px from the middle: a sixth of the readout from its middle the camera has flown 2/3 m, and
         // (1/100 - 1/150) of that is between roof and ground.
@@ -363,15 +459,27 @@ mod tests {
     #[test]
     fn finer_ideal_frames_and_blur_leave_less() {
         let still = outlook(0.0, 1.0, Holes::default());
-        let [coarse, fine] = [1.0, 2.0].map(|scale| still.plain(scale).at_dn);
-        assert!(fine < coarse && fine > 0.5 * coarse, "the strips stay: {fine} {coarse}");
-        let blurred = outlook(20.0, 1.0, Holes::default()).plain(1.0);
+        let spline = |scale: f64| Sampling { taps: TapStage::Spline, ..read_at(scale) };
+        let [coarse, fine] = [1.0, 2.0].map(|scale| still.plain(&spline(scale), None).at_dn);
+        let strips = still.of(still.strips).at_dn;
+        assert!(fine < 0.6 * coarse && fine > strips && strips > 0.0, "the strips stay: {fine} {coarse} {strips}");
+        let path_px = outlook(20.0, 1.0, Holes::default()).places[0].sides_px[1];
+        assert!(path_px > 1.0, "{path_px}");
+        let samples = ExposurePath::STRAIGHT.with_samples(2.0, 64);
+        let blurred = outlook(20.0, 1.0, Holes::default()).plain(&spline(1.0), Some(samples));
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);
         // White on black costs more than a 255th; nothing is left of it.
         assert!(!blurred.are_affordable(1.0) && blurred.are_affordable(16.0), "{blurred:?}");
-        let rays = still.with_rays(1.0, 1);
-        assert!(rays.error_dn < still.plain(1.0).error_dn);
-        assert_eq!(still.with_rays(2.0, 1), still.with_rays(1.0, 2));
+        let with_rays = |scale: f64, fine: u32| still.with_rays(&spline(scale), None, fine);
+        assert!(with_rays(1.0, 1).error_dn < still.plain(&spline(1.0), None).error_dn);
+        assert_eq!(with_rays(2.0, 1), with_rays(1.0, 2));
+        // What nothing can leave less of lets nobody think that more would be left.
+        for scale in [1.0, 1.41, 2.0, 2.83, 4.0] {
+            for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 4 }] {
+                let plain = still.plain(&Sampling { taps, ..read_at(scale) }, None);
+                assert!(still.plain_at_best(scale).error_dn < plain.error_dn, "{scale} {taps:?}");
+            }
+        }
         assert!(still.price_of_rays(1.0, 2) > still.price_of_rays(2.0, 1), "more pixels cost less than finer ones");
     }
 }

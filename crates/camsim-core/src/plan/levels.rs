@@ -28,9 +28,11 @@ const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
-const SCALES: [f64; 9] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83];
-/// Beyond it only for silhouettes with rays: there more pixels, whose samples have depth alone, cost less than finer ones.
+const SCALES: [f64; 12] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, FINEST_SCALE];
+/// Beyond it only for silhouettes.
 pub(super) const MOST_SCALE: f64 = 2.0;
+/// As many pixels along a side of one of the camera's as are read.
+pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
 /// What is left of a tolerance and what is taken of it may add up to a little more.
@@ -90,6 +92,9 @@ pub(super) struct Task<'a> {
     pub exposure: Option<ExposurePath>,
 }
 
+/// What comes to the error of a way of sampling over the picture, 1/255 of the linear range; `None` where that is not to be.
+pub(super) type Beside<'a> = dyn Fn(&Sampling, Option<BlurStage>) -> Option<f64> + 'a;
+
 /// What was chosen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
@@ -136,9 +141,9 @@ impl Prospect<'_> {
         self.sights.iter().map(|sight| sight.weight).sum::<f64>().max(1e-9)
     }
 
-    /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is what comes to it over the picture with an ideal frame of a
-    /// scale, 1/255; `None` where that scale is not to be.
-    pub fn choose(&self, task: &Task<'_>, beside_dn: &dyn Fn(f64) -> Option<f64>) -> Choice {
+    /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is what comes to it over the picture with a way of
+    /// sampling, 1/255; `None` where that is not to be.
+    pub fn choose(&self, task: &Task<'_>, beside_dn: &Beside<'_>) -> Choice {
         let &Task { quality, max_error_dn, least_scale, most_scale, ideal_share, exposure } = task;
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && scale < most_scale);
@@ -169,30 +174,33 @@ impl Prospect<'_> {
             let expected = self.expected(&sampling, blur);
             Sampling { expected, ..sampling }
         };
-        let mut failed: Vec<(f64, f64, Sampling)> = Vec::new();
+        let mut failed: Vec<(f64, Sampling)> = Vec::new();
         let mut cheapest: Option<(f64, f64, Sampling)> = None;
         for (least_cost, sampling) in ways {
             let below = cheapest.map_or(f64::INFINITY, |(price, ..)| price);
             if price(least_cost, 0.0) >= below {
                 break;
             }
-            let Some(beside_dn) = beside_dn(sampling.scale) else { continue };
-            let in_all_dn = |sampling: &Sampling| sampling.expected.total_dn().hypot(beside_dn);
             // The most samples first: if those do not do, fewer need not be tried.
             let choices = choices(sampling.scale);
             let Some((&last, fewer)) = choices.split_last() else { continue };
             let most = way(sampling, last);
-            let rough_dn = roughly_dn(most).hypot(beside_dn);
+            let Some(beside_most_dn) = beside_dn(&most.0, most.1) else { continue };
+            let is_far = beside_most_dn > FAR * max_error_dn;
+            let rough_dn = if is_far { beside_most_dn } else { roughly_dn(most).hypot(beside_most_dn) };
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
-            let total_dn = tried.as_ref().map_or(rough_dn, in_all_dn);
+            let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
-                None => failed.push((total_dn, beside_dn, sampling)),
+                None => failed.push((total_dn, sampling)),
                 Some(tried) => {
                     let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0) < below);
-                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * max_error_dn).map(|way| (cost(&way), exactly(way)));
-                    let enough = near.filter(|(_, sampling)| in_all_dn(sampling) <= max_error_dn);
-                    let priced =
-                        enough.chain([(cost(&most), tried)]).map(|(cost, way)| (price(cost, in_all_dn(&way)), in_all_dn(&way), way));
+                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * max_error_dn).filter_map(|way| {
+                        let beside_dn = beside_dn(&way.0, way.1)?;
+                        let found = exactly(way);
+                        Some((cost(&way), found.expected.total_dn().hypot(beside_dn), found))
+                    });
+                    let enough = near.filter(|(_, total_dn, _)| *total_dn <= max_error_dn);
+                    let priced = enough.chain([(cost(&most), total_dn, tried)]).map(|(cost, dn, way)| (price(cost, dn), dn, way));
                     let found = priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }
@@ -202,11 +210,12 @@ impl Prospect<'_> {
             return Choice { sampling, price, total_dn, within: true };
         }
         // The cheapest of those that come near the best, with no more samples than that takes.
-        let enough_dn = NEARLY * failed.iter().map(|(total_dn, ..)| *total_dn).fold(f64::INFINITY, f64::min);
-        let none = (f64::INFINITY, f64::INFINITY, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
-        let (_, beside_dn, sampling) = failed.into_iter().find(|(total_dn, ..)| *total_dn <= enough_dn).unwrap_or(none);
+        let enough_dn = NEARLY * failed.iter().map(|(total_dn, _)| *total_dn).fold(f64::INFINITY, f64::min);
+        let none = (f64::INFINITY, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
+        let (_, sampling) = failed.into_iter().find(|(total_dn, _)| *total_dn <= enough_dn).unwrap_or(none);
         let of = |way: (Sampling, Option<BlurStage>)| {
             let sampling = exactly(way);
+            let beside_dn = beside_dn(&way.0, way.1).unwrap_or(f64::INFINITY);
             Choice { sampling, price: cost(&way), total_dn: sampling.expected.total_dn().hypot(beside_dn), within: false }
         };
         let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
@@ -215,10 +224,10 @@ impl Prospect<'_> {
     }
 
     /// A way of sampling that another frame has chosen.
-    pub fn given(&self, sampling: &Sampling, task: &Task<'_>, beside_dn: f64) -> Choice {
+    pub fn given(&self, sampling: &Sampling, task: &Task<'_>, beside_dn: &Beside<'_>) -> Choice {
         let blur = sampling.tried(task.quality, task.exposure);
         let expected = self.expected(sampling, blur);
-        let total_dn = expected.total_dn().hypot(beside_dn);
+        let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
         let price = self.cost(sampling, blur, task.ideal_share);
         Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= task.quality.max_error_dn }
     }
@@ -255,7 +264,7 @@ impl Prospect<'_> {
 }
 
 /// Samples of a pixel whose path is so long, if it is equally long in each of its stretches.
-fn sample_count(blur: &BlurStage, length_px: f64, area: &Footprint) -> u32 {
+pub(super) fn sample_count(blur: &BlurStage, length_px: f64, area: &Footprint) -> u32 {
     let stretches = blur.stretches();
     let at_least = (area.taps[0] * area.taps[1]).div_ceil(stretches);
     stretches * samples_for(length_px / f64::from(stretches), blur.samples_per_px, at_least, blur.max_samples)
@@ -300,7 +309,7 @@ pub(super) fn in_the_way(
 
 impl Sampling {
     /// Of which nothing is expected yet.
-    fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
+    pub fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
         Self { scale, surface_reads, taps, samples_per_px: 0.0, expected: Expected::default() }
     }
 
@@ -316,7 +325,7 @@ impl Sampling {
     }
 
     /// The exposure's samples where the longest path is not known yet.
-    fn tried(&self, quality: &QualitySpec, exposure: Option<ExposurePath>) -> Option<BlurStage> {
+    pub fn tried(&self, quality: &QualitySpec, exposure: Option<ExposurePath>) -> Option<BlurStage> {
         let max_samples = quality.blur_samples.value().unwrap_or(MAX_SAMPLES);
         exposure.map(|exposure| exposure.with_samples(self.samples_per_px, max_samples))
     }

@@ -173,6 +173,6 @@ impl Scenery<'_> {
     /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
     pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
         let is_auto = quality.silhouettes == Silhouettes::Auto;
-        self.outlook.is_none_or(|outlook| !is_auto || outlook.plain(scale).are_affordable(quality.max_error_dn))
+        self.outlook.as_ref().is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale).are_affordable(quality.max_error_dn))
     }
 }

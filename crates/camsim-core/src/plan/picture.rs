@@ -1,13 +1,17 @@
 //! How a frame's picture is made: what reads the ideal frame and how fine that is, and whether pixels at silhouettes have rays of their own.
 
 use super::{
+    BlurStage,
     contours::{Contours, Outlook},
     edges,
-    levels::{Choice, MOST_SCALE, NEARLY, Sampling, Task},
+    levels::{Choice, FINEST_SCALE, MOST_SCALE, NEARLY, Sampling, Task},
     look::{Look, Scenery},
     prospect::Prospect,
 };
 use crate::scenario::{Auto, Silhouettes};
+
+/// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost less than finer ones.
+const MOST_SCALE_WITH_RAYS: f64 = 2.83;
 
 /// What was chosen.
 pub(super) struct Picture {
@@ -41,13 +45,13 @@ impl Look<'_> {
         let layers_dn = scenery.layers_dn();
         let given = self.common.and_then(|common| common.given);
         let Some(outlook) = outlook else {
-            let usual = |scale: f64| is_usual(scale, &task).then_some(layers_dn);
-            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, layers_dn));
+            let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
+            let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
             return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
         };
         let plain = || match given {
-            Some(given) => prospect.given(&given, &task, outlook.plain(given.scale).error_dn.hypot(layers_dn)),
-            None => prospect.choose(&task, &|scale| Some(plain_dn(outlook, &task, scale)?.hypot(layers_dn))),
+            Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
+            None => prospect.choose(&task, &|sampling, blur| Some(plain_dn(outlook, &task, sampling, blur)?.hypot(layers_dn))),
         };
         let with_rays = || {
             let most_fine = |scale: f64| {
@@ -76,8 +80,8 @@ impl Look<'_> {
                 (with_rays, false, fine)
             }
         };
-        let scale = choice.sampling.scale;
-        let silhouettes = Some(if is_plain { outlook.plain(scale) } else { outlook.with_rays(scale, fine) });
+        let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
+        let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine) });
         Picture { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price }
     }
 
@@ -96,17 +100,17 @@ impl Look<'_> {
     }
 }
 
-/// Scales that are taken without rays; those that are asked for, or the lens needs, are.
-fn is_usual(scale: f64, task: &Task<'_>) -> bool {
-    scale <= task.least_scale.max(MOST_SCALE) || task.quality.ideal_scale.value().is_some()
+/// Whether a scale is not above a usual one; those that are asked for, or the lens needs, always are.
+fn is_up_to(most_scale: f64, scale: f64, task: &Task<'_>) -> bool {
+    scale <= task.least_scale.max(most_scale) || task.quality.ideal_scale.value().is_some()
 }
 
 /// Error over the picture of silhouettes that are left as they are; `None` where that is not to be.
-fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
-    let plain = outlook.plain(scale);
-    if !is_usual(scale, task) {
+fn plain_dn(outlook: &Outlook, task: &Task<'_>, sampling: &Sampling, blur: Option<BlurStage>) -> Option<f64> {
+    if !is_up_to(FINEST_SCALE, sampling.scale, task) {
         return None;
     }
+    let plain = outlook.plain(sampling, blur);
     (task.quality.silhouettes == Silhouettes::Plain || plain.are_affordable(task.max_error_dn)).then_some(plain.error_dn)
 }
 
@@ -114,8 +118,10 @@ fn plain_dn(outlook: &Outlook, task: &Task<'_>, scale: f64) -> Option<f64> {
 /// that these are for what the finest ideal frame does not do.
 fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers_dn: f64, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
     let choose = |fine: u32| {
-        let may = |scale: f64| fine <= most_fine(scale) && (fine == 1 || is_usual(scale, task));
-        let choice = prospect.choose(task, &|scale| may(scale).then(|| outlook.with_rays(scale, fine).error_dn.hypot(layers_dn)));
+        let most_scale = if fine == 1 { MOST_SCALE_WITH_RAYS } else { MOST_SCALE };
+        let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
+        let choice = prospect
+            .choose(task, &|sampling, blur| may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine).error_dn.hypot(layers_dn)));
         (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
     };
     let mut failed = Vec::new();

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::{
     FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
     bounds::View,
-    levels::{MOST_SCALE, Sampling},
+    levels::{FINEST_SCALE, Sampling},
 };
 use crate::scenario::{Auto, Preset, Silhouettes};
 
@@ -198,7 +198,7 @@ impl Planner {
     fn plan_shared(&self, frame: u64, common: &Common) -> Option<FramePlan> {
         let look = self.look(frame, Some(common)).ok()?;
         let scenery = look.scenery();
-        let scale = common.given.as_ref().map_or(MOST_SCALE, |sampling| sampling.scale);
+        let scale = common.given.as_ref().map_or(FINEST_SCALE, |sampling| sampling.scale);
         if !scenery.may_be_shared(&self.sequence.scenario.quality, scale) {
             return None;
         }

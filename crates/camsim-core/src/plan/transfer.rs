@@ -271,7 +271,7 @@ impl Waves {
 }
 
 /// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
-fn read_wave(f: DVec2, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> [Wave; 2] {
+pub(super) fn read_wave(f: DVec2, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> [Wave; 2] {
     let [mut smooth, mut in_samples] = [Wave::ZERO; 2];
     let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
     for (x, y) in x.iter().flat_map(|x| y.iter().map(move |y| (x, y))) {

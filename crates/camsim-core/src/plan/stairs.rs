@@ -1,0 +1,151 @@
+//! What is left of a border's stairs by what reads the ideal frame.
+//!
+//! The ideal frame shows one surface or the other in each of its pixels; the exact pixel has its share of both. How far apart the two are depends on
+//! what reads the ideal frame: reads all over a pixel's area mend stairs, one bilinear read of a frame three times as fine hardly does.
+//!
+//! Straight borders that run every way have a spectrum: of length L in an area A and contrast C, `C^2 L / A / (4 pi^3 f^3)` for each square cycle.
+//! Nothing filters it before the ideal frame, and with what the reads leave of its waves and of those that look like them (`transfer.rs`) the squared
+//! error of a pixel is a sum over frequencies, as that of textures is.
+
+use std::{
+    collections::HashMap,
+    f64::consts::{LN_2, PI},
+    sync::{LazyLock, PoisonError, RwLock},
+};
+
+use glam::DVec2;
+
+use super::transfer::{Path, read_wave, sinc};
+use crate::temporal::{Footprint, TapStage};
+
+/// Frequencies that count, cycles an ideal pixel.
+const LOWEST: f64 = 0.031_25;
+const OCTAVES: u32 = 9;
+const AN_OCTAVE: u32 = 2;
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// Of a half-plane.
+const DIRECTIONS: u32 = 32;
+/// Where the source lies between ideal pixels: anywhere alike.
+const BESIDE_PX: [DVec2; 2] = [DVec2::new(0.13, 0.38), DVec2::new(0.62, 0.87)];
+/// Steps of a doubling that widths and paths are told apart by.
+const STEPS: f64 = 8.0;
+/// Direction of the path: borders run every way, so that it matters little.
+const ALONG: f64 = 0.5;
+
+/// What reads the ideal frame for a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reading {
+    /// Side of the pixel, ideal pixels.
+    pub width_px: f64,
+    pub taps: TapStage,
+    /// Path over the exposure, ideal pixels, and the samples on it.
+    pub exposure: Option<(f64, u32)>,
+}
+
+type Key = (i32, TapStage, Option<(i32, u32)>);
+
+/// What has been worked out: a few hundred ways for all frames of a scene.
+static KNOWN: LazyLock<RwLock<HashMap<Key, f64>>> = LazyLock::new(RwLock::default);
+
+/// Squared error that a border leaves in the picture: mean over pixels, for a contrast of 1 and as many pixel sides of border as pixels.
+pub(super) fn left(reading: &Reading) -> f64 {
+    let step = |px: f64| (STEPS * px.max(1e-3).log2()).round() as i32;
+    let key = (step(reading.width_px), reading.taps, reading.exposure.map(|(path_px, samples)| (step(path_px + 1.0), samples)));
+    if let Some(known) = KNOWN.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
+        return *known;
+    }
+    // Of the step itself: what is known does not depend on who asked first.
+    let px = |step: i32| (f64::from(step) / STEPS).exp2();
+    let exposure = key.2.map(|(path, samples)| (px(path) - 1.0, samples));
+    let found = worked_out(&Reading { width_px: px(key.0), taps: key.1, exposure });
+    // What is kept is replaced whole.
+    KNOWN.write().unwrap_or_else(PoisonError::into_inner).insert(key, found);
+    found
+}
+
+fn worked_out(&Reading { width_px, taps, exposure }: &Reading) -> f64 {
+    let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
+    let path = exposure.map(|(path_px, samples)| Path { along: path_px * DVec2::from_angle(ALONG), samples });
+    let wave = |i: u32, j: u32| {
+        // Not the same in all directions: what pixels make of fast waves goes up and down with each cycle.
+        let length = LOWEST * ((f64::from(i) + (f64::from(j) * GOLDEN).fract()) / f64::from(AN_OCTAVE)).exp2();
+        // The other half-plane is its mirror image.
+        let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
+        let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
+        let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
+        let error = |beside_px: DVec2| (read_wave(f, &area, path, beside_px)[1] - DVec2::new(exact, 0.0)).length_squared();
+        weight / (4.0 * (PI * length).powi(3)) * BESIDE_PX.into_iter().map(error).sum::<f64>() / BESIDE_PX.len() as f64
+    };
+    let square: f64 = (0..OCTAVES * AN_OCTAVE).flat_map(|i| (0..DIRECTIONS).map(move |j| (i, j))).map(|(i, j)| wave(i, j)).sum();
+    // A border of a length in output pixels is as many times longer in ideal pixels as those are smaller, their area by the square of it.
+    square / width_px
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        plan::PathStage,
+        temporal::{ColorImage, gather},
+    };
+
+    /// The same by drawing borders: in all places and directions, each read by the very gather of the twin, beside the area that it truly covers.
+    fn measured(reading: &Reading) -> f64 {
+        const SIDE: u32 = 40;
+        const BORDERS: u32 = 600;
+        const PLACES: u32 = 16;
+        let Reading { width_px, taps, exposure } = *reading;
+        let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
+        let part = |k: u32, step: f64| (f64::from(k + 1) * step).fract();
+        let path = exposure.map_or(0.0, |(path_px, _)| path_px);
+        let reach_px = 0.5 * path + width_px + 3.0;
+        let squares = (0..BORDERS).map(|k| {
+            let normal = DVec2::from_angle(2.0 * PI * part(k, 0.754_877_666_246_693));
+            let along = path * DVec2::from_angle(2.0 * PI * part(k, 0.324_717_957_244_746));
+            let at = DVec2::splat(19.0) + DVec2::new(part(k, 0.618_033_988_749_895), part(k, 0.414_213_562_373_095));
+            let border = at.dot(normal) + reach_px * (2.0 * part(k, 0.569_840_290_998_053) - 1.0);
+            let lit = |px: DVec2| f64::from(px.dot(normal) < border);
+            let rgba: Vec<f32> =
+                (0..SIDE * SIDE).flat_map(|i| [lit(DVec2::new(f64::from(i % SIDE), f64::from(i / SIDE))) as f32; 4]).collect();
+            let image = ColorImage { size_px: [SIDE; 2], rgba: &rgba };
+            let nodes = [at - 0.5 * along, at + 0.5 * along];
+            let found = match exposure {
+                None => gather(&[at], PathStage::Straight, &area, &image, 1.0, 1),
+                Some((_, samples)) => gather(&nodes, PathStage::Straight, &area, &image, 1e9, samples),
+            };
+            let instants = if exposure.is_some() { 16 } else { 1 };
+            let inside = (0..PLACES * PLACES * instants).map(|i| {
+                let [x, y] = [i % PLACES, i / PLACES % PLACES].map(|n| (f64::from(n) + 0.5) / f64::from(PLACES) - 0.5);
+                let share = (f64::from(i / (PLACES * PLACES)) + 0.5) / f64::from(instants) - 0.5;
+                lit(at + share * along + width_px * DVec2::new(x, y))
+            });
+            (found.x - inside.sum::<f64>() / f64::from(PLACES * PLACES * instants)).powi(2)
+        });
+        // A border within reach of a pixel on both sides, in output pixels, crosses 1 of as many.
+        squares.sum::<f64>() / f64::from(BORDERS) * 2.0 * reach_px / width_px
+    }
+
+    #[test]
+    fn borders_leave_what_drawing_them_finds() {
+        let grid = TapStage::Grid { most: 4 };
+        for width_px in [1.0, 1.41, 2.0, 3.0] {
+            for taps in [TapStage::Bilinear, TapStage::Spline, grid] {
+                for exposure in [None, Some((1.0, 2)), Some((6.0, 6)), Some((6.0, 20))] {
+                    let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
+                    let at_least = |(path_px, samples): (f64, u32)| (path_px, samples.max(area.taps[0] * area.taps[1]));
+                    let reading = Reading { width_px, taps, exposure: exposure.map(at_least) };
+                    let (told, found) = (worked_out(&reading), measured(&reading));
+                    let off = (told / found).sqrt();
+                    // Of long paths the waves across them count for too much.
+                    assert!((0.95..1.5).contains(&off), "{reading:?}: {told:.2e}, measured {found:.2e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_known_is_what_was_worked_out() {
+        let reading = Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: Some((7.0, 8)) };
+        assert_eq!([left(&reading), left(&reading)], [worked_out(&reading); 2]);
+    }
+}
