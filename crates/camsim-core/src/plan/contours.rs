@@ -40,8 +40,9 @@ const STRIPS: f64 = 2.0;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
 const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
-/// Part of what stairs cost, squared, that rays leave of it.
+/// Part of what stairs cost, squared, that rays leave of it; and how sure what is known of rays is, which was found with a look once a pixel.
 const RAYS_LEAVE: f64 = 0.42;
+const SAFETY_WITH_RAYS: f64 = 1.2;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
 const LEAST_LEFT: f64 = 0.1;
 /// Steps of a doubling that widths and paths of pixels with borders are told apart by.
@@ -102,10 +103,14 @@ pub(super) struct Outlook {
     strips: f64,
     /// Squared contrast of borders, times their length in pixels, mean over the pixels of the picture: of steps of depth,
     steps: f64,
+    /// the same as a look once a pixel finds them,
+    steps_apart: f64,
     /// between meshes that touch,
     flush: f64,
     /// and where depth bends.
     feet: f64,
+    /// Part of these two that a look once a pixel finds.
+    once_a_pixel: f64,
     places: Vec<Place>,
 }
 
@@ -151,15 +156,18 @@ impl Outlook {
         let over_all = |of: &dyn Fn(&Crossed) -> f64| {
             SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
         };
+        let (of_probes, of_lines) = (SAFETY * SAFETY * share * mean(&Contour::steps), over_all(&|crossed| crossed.steps));
         let finer = finer(around);
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
             strips: STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip),
-            steps: (SAFETY * SAFETY * share * mean(&Contour::steps)).max(finer * over_all(&|crossed| crossed.steps)),
+            steps: of_probes.max(finer * of_lines),
+            steps_apart: of_probes.max(of_lines / finer),
             flush: finer * over_all(&|crossed| crossed.flush),
             feet: finer * over_all(&|crossed| crossed.feet),
+            once_a_pixel: (finer * finer).recip(),
             places: places(around),
         }
     }
@@ -197,7 +205,8 @@ impl Outlook {
         let as_they_are = self.left(sampling, blur);
         let through_samples = RAYS_LEAVE * self.along_whole_pixels(sampling.scale) / f64::from(fine * fine);
         let of_feet = if fine > 1 { through_samples } else { as_they_are };
-        self.of(through_samples * self.steps + as_they_are * self.flush + of_feet * self.feet)
+        let touching = self.once_a_pixel * (as_they_are * self.flush + of_feet * self.feet);
+        self.of((SAFETY_WITH_RAYS / SAFETY).powi(2) * (through_samples * self.steps_apart + touching))
     }
 
     /// Squared error of borders along whole pixels of an ideal frame, as [`Outlook::left`] has it for what reads it.
@@ -424,18 +433,31 @@ mod tests {
         assert_eq!(found.steps, 0.0);
         let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2)].map(|of| of.error_dn);
         let left = stairs::left(&Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
-        assert!((plain - rays).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
+        let rays_alike = rays * SAFETY / SAFETY_WITH_RAYS / found.once_a_pixel.sqrt();
+        assert!((plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
     }
 
     #[test]
     fn finer_samples_find_the_feet_of_walls() {
         let places = vec![Place { part: 1.0, sides_px: [1.0, 0.0] }];
-        let feet = Outlook { share: 0.5, contrast_dn: 100.0, hidden_share: 0.0, strips: 0.0, steps: 0.0, flush: 0.0, feet: 1e-3, places };
+        let feet = Outlook {
+            share: 0.5,
+            contrast_dn: 100.0,
+            hidden_share: 0.0,
+            strips: 0.0,
+            steps: 0.0,
+            steps_apart: 0.0,
+            flush: 0.0,
+            feet: 1e-3,
+            once_a_pixel: 1.0,
+            places,
+        };
         let with_rays = |fine: u32| feet.with_rays(&read_at(2.0), None, fine).error_dn;
-        assert_eq!(with_rays(1), feet.plain(&read_at(2.0), None).error_dn);
+        let less = SAFETY_WITH_RAYS / SAFETY;
+        assert!((with_rays(1) / feet.plain(&read_at(2.0), None).error_dn - less).abs() < 1e-12);
         // Of 1/12 in a pixel's width, in pixels half as wide.
         let along_whole_pixels = 255.0 * (1e-3_f64 / 12.0).sqrt() / 2.0;
-        assert!((with_rays(3) / along_whole_pixels - RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{}", with_rays(3));
+        assert!((with_rays(3) / along_whole_pixels - less * RAYS_LEAVE.sqrt() / 3.0).abs() < 1e-12, "{}", with_rays(3));
     }
 
     #[test]
