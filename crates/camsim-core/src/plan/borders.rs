@@ -4,11 +4,11 @@
 //! Lines across the picture tell without bias: of borders of length L in an area A, whichever way they run, a line crosses `2 L / (pi A)` for each of
 //! its pixels (Crofton). A row and a column through each probe are looked at pixel by pixel; two borders within one pixel are still missed.
 
-use std::f64::consts::FRAC_PI_2;
+use std::{cell::OnceCell, f64::consts::FRAC_PI_2};
 
 use glam::DVec2;
 
-use super::{contours::Search, probes::Probe, prospect::path_px};
+use super::{contours::Search, probes::Probe, prospect::path_px, surfaces::Light};
 use crate::{
     silhouette::{NEAR_PX, bends, may_step, steps},
     temporal::marks::FINE_EDGE_STEP,
@@ -43,15 +43,18 @@ impl Search<'_> {
             let met: [_; PLACES] = std::array::from_fn(|k| meet(k as f64));
             let inverse_depths = met.map(|met| met.map_or(0.0, |met| met.depth_m.recip()));
             depth = inverse_depths[PLACES / 2];
+            // Each place is asked by both of its neighbours.
+            let lights: [OnceCell<Light>; PLACES] = std::array::from_fn(|_| OnceCell::new());
+            let light = |k: usize| {
+                let way = uv(k as f64).extend(1.0);
+                lights[k]
+                    .get_or_init(|| self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[k].as_ref(), way.length()))
+            };
             let around = |k: usize| [inverse_depths[k], inverse_depths[k + 1], inverse_depths[k + 2]];
             for k in 0..PLACES - 1 {
                 let either = |is: &dyn Fn([f64; 3]) -> bool| (k > 0 && is(around(k - 1))) || (k + 2 < PLACES && is(around(k)));
                 let may = either(&may_step);
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
-                let light = |k: usize| {
-                    let way = uv(k as f64).extend(1.0);
-                    self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[k].as_ref(), way.length())
-                };
                 let square = || (light(k).color - light(k + 1).color).length_squared() / 3.0;
                 let mesh = |k: usize| met[k].as_ref().map_or(0, |met| met.surface);
                 if may && steps(inverse_depths[k], inverse_depths[k + 1], between) {
