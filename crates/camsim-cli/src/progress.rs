@@ -1,5 +1,7 @@
 //! The progress bar: on standard error, and only if that is a terminal.
 
+use std::time::Duration;
+
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// A bar over `frames`; invisible with `quiet` or away from a terminal.
@@ -10,5 +12,16 @@ pub fn frames_bar(frames: u64, quiet: bool) -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style);
     }
+    bar
+}
+
+/// Says what is being done that has no known end, with the seconds that it has taken; invisible with `quiet` or away from a terminal. Clear it when it is done.
+pub fn waiting(what: &'static str, quiet: bool) -> ProgressBar {
+    let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let bar = ProgressBar::with_draw_target(None, target).with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg}, {elapsed}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(500));
     bar
 }

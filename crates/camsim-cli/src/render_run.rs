@@ -20,7 +20,7 @@ use crate::{
     failure::{Failure, OrFail},
     frame_list::Shard,
     frame_source::FrameSource,
-    progress::frames_bar,
+    progress::{frames_bar, waiting},
     tolerances::Tolerances,
 };
 
@@ -52,6 +52,8 @@ pub struct Outcome {
     pub bytes: u64,
     /// From the first submission until the last file was written.
     pub time: Duration,
+    /// Before that: what it took to plan the first of them.
+    pub first_plan: Duration,
 }
 
 impl Outcome {
@@ -76,9 +78,14 @@ pub fn run(
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // What cannot be planned is refused before anything is written.
+    let begin = Instant::now();
     if let Some(&first) = todo.first() {
-        source.planner().plan(first).or_bad_input()?;
+        let waiting = waiting("planning the first frame", console.is_quiet());
+        let planned = source.planner().plan(first);
+        waiting.finish_and_clear();
+        planned.or_bad_input()?;
     }
+    let first_plan = begin.elapsed();
     let mut manifest = RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         adapter: source.adapter(),
@@ -121,7 +128,7 @@ pub fn run(
     manifest.written = todo.len() as u64;
     manifest.finished = true;
     manifest.write(job.folder).or_failed()?;
-    Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time })
+    Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
 }
 
 /// Of frames that see only sky, and of those without a valid pixel.

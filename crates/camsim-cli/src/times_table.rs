@@ -1,15 +1,36 @@
 //! `camsim render --times`: where the time of the frames went.
 
+use std::time::{Duration, Instant};
+
 use camsim_gpu::engine::FrameTimes;
+
+use crate::progress::waiting;
 
 /// Milliseconds of each part, one entry a frame, in the order in which frames meet the parts.
 #[derive(Debug, Default)]
 pub struct TimesTable {
+    /// What was done once, before the first frame.
+    start: Vec<(&'static str, Duration)>,
     parts: Vec<(String, Vec<f64>)>,
     frames: usize,
 }
 
 impl TimesTable {
+    /// Takes in what was done once, before the first frame.
+    pub fn begun(&mut self, name: &'static str, time: Duration) {
+        self.start.push((name, time));
+    }
+
+    /// Does something once, before the first frame, and says so if it takes long.
+    pub fn timed<T>(&mut self, name: &'static str, quiet: bool, work: impl FnOnce() -> T) -> T {
+        let begin = Instant::now();
+        let waiting = waiting(name, quiet);
+        let done = work();
+        waiting.finish_and_clear();
+        self.begun(name, begin.elapsed());
+        done
+    }
+
     /// Takes in a frame.
     pub fn add(&mut self, times: &FrameTimes) {
         self.frames += 1;
@@ -45,6 +66,10 @@ impl TimesTable {
         }
         if self.parts.iter().all(|(name, _)| name.starts_with("host")) {
             text += "  the adapter has no time stamps\n";
+        }
+        text += "ms before the first frame\n";
+        for (name, time) in &self.start {
+            text += &format!("  {name:<22}{:>10.2}\n", time.as_secs_f64() * 1e3);
         }
         text
     }

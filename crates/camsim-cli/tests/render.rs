@@ -75,7 +75,14 @@ fn timing_runs_write_no_frame() {
     let quiet =
         ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--frames", "0", "--format", "none", "--times", "-q"];
     let (code, out, err) = camsim(&quiet);
-    assert!(code == 0 && out.starts_with("ms a frame") && out.contains("host: plan") && err.is_empty(), "{out}{err}");
+    assert!(
+        code == 0
+            && out.starts_with("ms a frame")
+            && out.contains("host: plan")
+            && out.contains("plan of the first frame")
+            && err.is_empty(),
+        "{out}{err}"
+    );
 }
 
 /// Set in the copy of this test that runs where no adapter can be found.

@@ -3,7 +3,7 @@
 //! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu crate executes it, and
 //! nothing in it depends on the frame before.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
@@ -88,6 +88,8 @@ pub struct Planner {
     max_ideal_px: u64,
     /// The last groups of frames that were looked at.
     groups: Mutex<sharing::Recent>,
+    /// The last plan of a frame by itself: whoever asks whether it can be planned asks for it again.
+    last: Mutex<Option<FramePlan>>,
 }
 
 impl Planner {
@@ -132,7 +134,20 @@ impl Planner {
         };
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let max_ideal_px = MAX_IDEAL_PX;
-        Ok(Self { sequence, shutter, zoom, fixed, outline, grain, surfaces, truth, max_side_px, max_ideal_px, groups: Mutex::default() })
+        Ok(Self {
+            sequence,
+            shutter,
+            zoom,
+            fixed,
+            outline,
+            grain,
+            surfaces,
+            truth,
+            max_side_px,
+            max_ideal_px,
+            groups: Mutex::default(),
+            last: Mutex::default(),
+        })
     }
 
     /// For renderers that only want to know the geometry of the ideal frame and never make it: any number of pixels will do.
@@ -180,8 +195,15 @@ impl Planner {
 
     /// The plan of a frame by itself.
     fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
+        // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
+        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = last().as_ref().filter(|known| known.frame == frame) {
+            return Ok(known.clone());
+        }
         let look = self.look(frame, None)?;
-        self.plan_of(&look, &look.scenery())
+        let plan = self.plan_of(&look, &look.scenery())?;
+        *last() = Some(plan.clone());
+        Ok(plan)
     }
 
     fn plan_of(&self, look: &Look<'_>, scenery: &Scenery<'_>) -> Result<FramePlan, PlanError> {

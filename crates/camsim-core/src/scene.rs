@@ -7,6 +7,7 @@ use crate::pose::CameraPose;
 
 pub mod board;
 pub(crate) mod box_tree;
+pub mod crossings;
 pub mod levels;
 pub mod light;
 pub mod mesh;
@@ -16,6 +17,7 @@ pub mod terrain;
 pub mod texture;
 
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
+pub use crossings::{Crossings, cut_where_blended_cross};
 pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
 pub use light::Light;
 pub use mesh::{Material, Mesh, MeshVertex, Shape};

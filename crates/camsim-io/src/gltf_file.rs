@@ -4,6 +4,7 @@
 //! times vertex colour, plus what is emitted; light and shade are the scene's matter, which normals are read for if it asks. What cannot be shown is refused, with its name, or noted.
 
 use std::{
+    cell::Cell,
     collections::{HashMap, HashSet},
     path::{Path, PathBuf},
     sync::Arc,
@@ -211,6 +212,7 @@ impl Reader<'_> {
             let shape = match self.shapes.get(&key).filter(|_| !own) {
                 Some(shape) => shape.clone(),
                 None => {
+                    let beyond = Cell::new(false);
                     let made = primitive::Making {
                         source: self.source,
                         triangles,
@@ -219,8 +221,14 @@ impl Reader<'_> {
                         weights: &weights,
                         joints: joints.as_deref(),
                         normals: self.options.normals && uv.takes_light,
+                        beyond: &beyond,
                     };
-                    Arc::new(made.shape(&primitive)?)
+                    let shape = made.shape(&primitive)?;
+                    if beyond.get() {
+                        let number = mesh.index();
+                        self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
+                    }
+                    Arc::new(shape)
                 }
             };
             if !own {

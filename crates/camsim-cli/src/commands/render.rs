@@ -110,7 +110,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
     let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read()?;
     let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
-    let loaded = inputs::load(&scenario, console)?;
+    let mut times = TimesTable::default();
+    let is_quiet = console.is_quiet();
+    let loaded = times.timed("scenario's files", is_quiet, || inputs::load(&scenario, console))?;
     let frames = match &args.frames {
         None => (0..loaded.sequence.frames).collect(),
         Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
@@ -125,16 +127,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
-        Box::new(Rays::new(&loaded.sequence)?)
+        Box::new(times.timed("scene for rays", is_quiet, || Rays::new(&loaded.sequence))?)
     } else {
-        engine = Engine::new(AdapterChoice::Best)?;
-        let mut device = Device::new(&engine, &loaded.sequence)?;
+        engine = times.timed("adapter", is_quiet, || Engine::new(AdapterChoice::Best))?;
+        let mut device = times.timed("scene onto the adapter", is_quiet, || Device::new(&engine, &loaded.sequence))?;
         if args.times {
             device.time_passes();
         }
         Box::new(device)
     };
-    let mut times = TimesTable::default();
     console.detail(format_args!("adapter: {}", source.adapter()));
     let mut look = |finished: &Finished| {
         times.add(&finished.times);
@@ -153,6 +154,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console.line(format_args!("{frames} frames{kept} in {seconds:.2} s, {rate:.1} frames/s, {size_mb:.1} MB in {folder}"))?;
     }
     if args.times {
+        times.begun("plan of the first frame", outcome.first_plan);
         console.print(&times.text())?;
     }
     Ok(())

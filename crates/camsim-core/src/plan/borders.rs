@@ -5,11 +5,11 @@
 //! its pixels (Crofton). A row and a column through each probe are looked at thrice a pixel. Two borders within a third
 //! of one are still missed; how many there are is told by those that a look once a pixel would have missed.
 
-use std::f64::consts::FRAC_PI_2;
+use std::{cell::OnceCell, f64::consts::FRAC_PI_2};
 
 use glam::DVec2;
 
-use super::{contours::Search, probes::Probe};
+use super::{contours::Search, probes::Probe, surfaces::Light};
 use crate::{
     silhouette::{bends, may_step, steps},
     temporal::marks::FINE_EDGE_STEP,
@@ -48,6 +48,13 @@ impl Search<'_> {
             let meet = |place: f64| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
             let met: [_; PLACES] = std::array::from_fn(|k| meet(k as f64));
             let inverse_depths = met.map(|met| met.map_or(0.0, |met| met.depth_m.recip()));
+            // Each place is asked by both of its neighbours.
+            let lights: [OnceCell<Light>; PLACES] = std::array::from_fn(|_| OnceCell::new());
+            let light = |k: usize| {
+                let way = uv(k as f64).extend(1.0);
+                lights[k]
+                    .get_or_init(|| self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[k].as_ref(), way.length()))
+            };
             let around = |k: usize| [inverse_depths[k], inverse_depths[k + 1], inverse_depths[k + 2]];
             let mut of_pixel = 0.0;
             for k in 0..PLACES - 1 {
@@ -55,10 +62,6 @@ impl Search<'_> {
                 let either = |is: &dyn Fn([f64; 3]) -> bool| (k > 0 && is(around(k - 1))) || (k + 2 < PLACES && is(around(k)));
                 let may = either(&may_step);
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
-                let light = |k: usize| {
-                    let way = uv(k as f64).extend(1.0);
-                    self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[k].as_ref(), way.length())
-                };
                 let between_places = |from: usize, to: usize| (light(from).color - light(to).color).length_squared() / 3.0;
                 let square = || between_places(k, k + 1);
                 let mesh = |k: usize| met[k].as_ref().map_or(0, |met| met.surface);

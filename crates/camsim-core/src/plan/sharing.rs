@@ -74,6 +74,7 @@ impl Planner {
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
     pub fn forget(&self) {
         self.groups.lock().unwrap_or_else(PoisonError::into_inner).0.clear();
+        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.

@@ -20,8 +20,13 @@ pub(super) const FOG_AT_VISIBILITY: f64 = 3.912;
 #[derive(Debug)]
 pub(super) struct Surfaces {
     scene: Arc<Scene>,
-    /// Boxes around the meshes, and around the triangles of each mesh's shape: meshes that share a shape share its tree.
+    /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them, and of those that are mixed with it. A ray
+    /// passes through thousands of panes to what is behind them.
     tree: BoxTree,
+    deep: BoxTree,
+    solid: BoxTree,
+    mixed: BoxTree,
+    /// Around the triangles of each mesh's shape: meshes that share a shape share its tree.
     shapes: Vec<Arc<BoxTree>>,
     /// From NED to the axes of each mesh's shape.
     shape_from_ned: Vec<DMat3>,
@@ -55,6 +60,58 @@ pub(super) struct Light {
     pub panes: Vec<usize>,
 }
 
+/// Share of the light behind panes below which nobody sees it.
+const HIDDEN: f64 = 1e-7;
+
+/// Where a ray passes through something that is mixed with what is behind it.
+struct Pane {
+    t: f64,
+    mesh: usize,
+    corners: [u32; 3],
+    weights: [f64; 3],
+    alpha: f64,
+}
+
+/// What a ray passes through, as far as anything is seen behind it.
+#[derive(Default)]
+struct Panes {
+    nearest_first: Vec<Pane>,
+    /// Whether what is behind the last one is hidden.
+    closed: bool,
+}
+
+impl Panes {
+    fn add(&mut self, pane: Pane) {
+        let place = self.nearest_first.partition_point(|other| other.t <= pane.t);
+        self.nearest_first.insert(place, pane);
+        let mut left = 1.0;
+        let hides = |pane: &Pane| {
+            left *= 1.0 - pane.alpha;
+            left < HIDDEN
+        };
+        if let Some(last) = self.nearest_first.iter().position(hides) {
+            self.nearest_first.truncate(last + 1);
+            self.closed = true;
+        }
+    }
+
+    /// Behind which nothing is looked for.
+    fn limit(&self) -> Option<f64> {
+        self.nearest_first.last().filter(|_| self.closed).map(|pane| pane.t)
+    }
+}
+
+/// Whether alpha reaches the cut-off anywhere on a mesh. `of_pictures` remembers the largest alpha of each picture.
+fn may_have_depth(mesh: &Mesh, of_pictures: &mut HashMap<*const Texture, u8>) -> bool {
+    /// Between corners alpha is rounded.
+    const HAIR: f64 = 1e-6;
+    let texture = &mesh.material.texture;
+    let most = || texture.rgba8.chunks_exact(4).map(|pixel| pixel[3]).max().unwrap_or(0);
+    let of_picture = f64::from(*of_pictures.entry(Arc::as_ptr(texture)).or_insert_with(most)) / 255.0;
+    let of_corners = mesh.shape.vertices.iter().map(|vertex| f64::from(vertex.tint[3])).fold(0.0, f64::max);
+    mesh.material.cutoff.is_none_or(|cutoff| of_picture * of_corners + HAIR >= f64::from(cutoff))
+}
+
 impl Surfaces {
     pub fn new(scene: Arc<Scene>) -> Self {
         let mut known: HashMap<*const Shape, Arc<BoxTree>> = HashMap::new();
@@ -71,11 +128,19 @@ impl Surfaces {
         };
         let shapes = scene.meshes.iter().map(|mesh| known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| tree_of(&mesh.shape)).clone());
         let shapes = shapes.collect();
-        let tree = BoxTree::new(&scene.mesh_bounds());
+        let bounds = scene.mesh_bounds();
+        let tree_if = |counts: &dyn Fn(&Mesh) -> bool| {
+            let counted = bounds.iter().zip(&scene.meshes).map(|(of, mesh)| if counts(mesh) { *of } else { Aabb::EMPTY });
+            BoxTree::new(&counted.collect::<Vec<_>>())
+        };
+        let of_pictures = RefCell::new(HashMap::new());
+        let deep = tree_if(&|mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut()));
+        let (solid, mixed) = (tree_if(&|mesh| !mesh.material.blends), tree_if(&|mesh| mesh.material.blends));
+        let tree = BoxTree::new(&bounds);
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
         let blends = scene.has_blended();
-        Self { scene, tree, shapes, shape_from_ned, blends, linear }
+        Self { scene, tree, deep, solid, mixed, shapes, shape_from_ned, blends, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
@@ -94,16 +159,14 @@ impl Surfaces {
 
     /// First surface along `origin + t direction`, t >= 0.
     pub fn meet(&self, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
-        self.meet_of(origin_ned_m, direction_ned, |_| true)
+        self.meet_in(&self.deep, origin_ned_m, direction_ned)
     }
 
-    fn meet_of(&self, origin_ned_m: DVec3, direction_ned: DVec3, counts: impl Fn(&Mesh) -> bool) -> Option<Met> {
+    fn meet_in(&self, tree: &BoxTree, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
         let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
-        let on_mesh = self.tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
-            let counts = counts(&self.scene.meshes[mesh as usize]);
-            let met = counts.then(|| self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit)).flatten();
-            met.map(|met| (met.depth_m, met))
+        let on_mesh = tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
+            self.meet_mesh(mesh as usize, origin_ned_m, direction_ned, limit).map(|met| (met.depth_m, met))
         });
         let on_ground = || ground.map(|hit| Met { depth_m: hit.t, surface: 0, uv: hit.uv, tint: DVec3::ONE, terrain: Some(hit) });
         on_mesh.map(|(_, met)| met).or_else(on_ground)
@@ -136,19 +199,19 @@ impl Surfaces {
         if !self.blends {
             return Light { color: self.color(met, range_per_depth), panes: Vec::new() };
         }
-        let solid = self.meet_of(origin_ned_m, direction_ned, |mesh| !mesh.material.blends);
+        let solid = self.meet_in(&self.solid, origin_ned_m, direction_ned);
         let panes = self.panes(origin_ned_m, direction_ned, solid.map_or(f64::INFINITY, |met| met.depth_m));
         let behind = self.smooth_color(solid.as_ref(), range_per_depth);
         let over = |behind: DVec3, (met, alpha): &(Met, f64)| behind.lerp(self.smooth_color(Some(met), range_per_depth), *alpha);
         Light { color: panes.iter().rev().fold(behind, over), panes: panes.iter().map(|(met, _)| met.surface).collect() }
     }
 
-    /// What is mixed along a ray before `limit`, from the eye on, with its alpha.
+    /// What is mixed along a ray before `limit`, from the eye on, with its alpha; without what next to nothing is left of behind the others.
     fn panes(&self, origin_ned_m: DVec3, direction_ned: DVec3, limit: f64) -> Vec<(Met, f64)> {
-        let found = RefCell::new(Vec::new());
-        self.tree.first(origin_ned_m, direction_ned, limit, |i, limit| -> Option<(f64, ())> {
+        let found = RefCell::new(Panes::default());
+        self.mixed.first(origin_ned_m, direction_ned, limit, |i, limit| -> Option<(f64, ())> {
             let i = i as usize;
-            let mesh = self.scene.meshes.get(i).filter(|mesh| mesh.material.blends)?;
+            let mesh = self.scene.meshes.get(i)?;
             let shape_from_ned = self.shape_from_ned[i];
             let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
             self.shapes[i].first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
@@ -157,14 +220,13 @@ impl Surfaces {
                 let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
                 let alpha = mesh.alpha_at(corners, weights).clamp(0.0, 1.0);
                 if alpha > 0.0 && mesh.faces(corners, direction_ned) {
-                    found.borrow_mut().push((self.met(i, t, corners, weights, direction_ned), alpha));
+                    found.borrow_mut().add(Pane { t, mesh: i, corners, weights, alpha });
                 }
-                None
+                found.borrow().limit().map(|t| (t, ()))
             })
         });
-        let mut found = found.into_inner();
-        found.sort_by(|(a, _), (b, _)| a.depth_m.total_cmp(&b.depth_m));
-        found
+        let met = |pane: Pane| (self.met(pane.mesh, pane.t, pane.corners, pane.weights, direction_ned), pane.alpha);
+        found.into_inner().nearest_first.into_iter().map(met).collect()
     }
 
     /// Place in the picture on what a ray met, texels.
@@ -244,6 +306,7 @@ mod tests {
     use glam::{DQuat, EulerRot};
 
     use super::*;
+    use crate::scene::MeshVertex;
 
     /// Waves of 30 m under three pictures at different heights, one of them tilted.
     fn scene() -> Scene {
@@ -295,6 +358,48 @@ mod tests {
             }
         }
         assert!(seen[0] > 50 && seen[1] > 10 && missed > 2, "{seen:?} {missed}");
+    }
+
+    #[test]
+    fn of_a_thousand_panes_those_are_seen_that_let_light_through() {
+        let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+        let level = |height_m: f64, tint: [f32; 4]| {
+            let mut mesh = Mesh::level_picture(texture.clone(), DVec3::new(0.0, 0.0, -height_m), 8.0);
+            Arc::make_mut(&mut mesh.shape).vertices.iter_mut().for_each(|vertex| vertex.tint = tint);
+            mesh
+        };
+        let pane = |height_m: f64, tint: [f32; 4]| {
+            let mut mesh = level(height_m, tint);
+            (mesh.material.blends, mesh.material.cutoff) = (true, Some(0.5));
+            mesh
+        };
+        let alpha = |k: u32| 0.02 + 0.3 * (f64::from(k) * 0.618_034).fract();
+        // Each by itself in no order of height, then all of them as one shape.
+        let many: Vec<Mesh> =
+            (0..1000).map(|k| k * 389 % 1000).map(|k| pane(0.1 * f64::from(k), [0.4, 0.001 * k as f32, 0.2, alpha(k) as f32])).collect();
+        let mut one = pane(0.0, [0.0; 4]);
+        let shape = Arc::make_mut(&mut one.shape);
+        (shape.vertices, shape.indices) = (Vec::new(), Vec::new());
+        for mesh in &many {
+            let first = shape.vertices.len() as u32;
+            let z_m = mesh.origin_ned_m.z as f32;
+            shape.vertices.extend(mesh.shape.vertices.iter().map(|vertex| {
+                let [x, y, _] = vertex.position_m;
+                MeshVertex { position_m: [x, y, z_m], ..*vertex }
+            }));
+            shape.indices.extend(mesh.shape.indices.iter().map(|index| first + index));
+        }
+        let (eye, down) = (DVec3::new(0.3, -0.7, -120.0), DVec3::new(0.001, 0.002, 1.0));
+        let over = |behind: DVec3, k: u32| behind.lerp(DVec3::new(0.4, 0.001 * f64::from(k), 0.2), alpha(k));
+        let expected = (0..1000).fold(DVec3::ONE, over);
+        for panes in [many, vec![one]] {
+            let surfaces = Surfaces::new(Arc::new(Scene { meshes: [panes, vec![level(-1.0, [1.0; 4])]].concat(), ..Scene::default() }));
+            let met = surfaces.meet(eye, down);
+            assert!(met.is_some_and(|met| (met.depth_m - 121.0).abs() < 1e-9), "what has no depth anywhere is not met");
+            let light = surfaces.light(eye, down, met.as_ref(), 1.0);
+            assert!((light.color - expected).abs().max_element() < 1e-6, "{} {expected}", light.color);
+            assert!((40..200).contains(&light.panes.len()), "{}", light.panes.len());
+        }
     }
 
     #[test]

@@ -87,6 +87,24 @@ impl BoxTree {
         best
     }
 
+    /// The things of all leaves whose boxes overlap `bounds` or touch it, in no order.
+    pub fn overlapping(&self, bounds: &Aabb) -> Vec<u32> {
+        let mut found = Vec::new();
+        let mut stack: Vec<usize> = if self.nodes.is_empty() { Vec::new() } else { vec![0] };
+        while let Some(at) = stack.pop() {
+            let node = &self.nodes[at];
+            if node.bounds.min.cmpgt(bounds.max).any() || node.bounds.max.cmplt(bounds.min).any() {
+                continue;
+            }
+            if node.count > 0 {
+                found.extend_from_slice(&self.things[node.next as usize..(node.next + node.count) as usize]);
+            } else {
+                stack.extend([at + 1, node.next as usize]);
+            }
+        }
+        found
+    }
+
     /// The smallest of what `measure` says of the leaves' boxes, infinite without any. `None` leaves out a box and all in it; a box must not be
     /// farther than those in it.
     pub fn nearest_box_m(&self, measure: impl Fn(&Aabb) -> Option<f64>) -> f64 {

@@ -62,6 +62,7 @@ impl<'a> Materials<'a> {
         }
         let base = material.pbr_metallic_roughness();
         let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
+        self.check_factors(material, &factor, &emitted)?;
         let emits = emitted.iter().any(|&part| part > 0.0);
         // Alpha is the base colour's, black or not.
         let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
@@ -121,6 +122,21 @@ impl<'a> Materials<'a> {
         let made = Material { texture, wrap, nearest, emissive, cutoff, blends, one_sided: !material.double_sided() };
         self.known.insert(material.index(), (made.clone(), rule));
         Ok((made, rule))
+    }
+
+    /// Refuses factors that are no numbers, and says which are beyond what there is.
+    fn check_factors(&mut self, material: &gltf::Material<'_>, base: &[f32], emitted: &[f32]) -> Result<(), GltfError> {
+        let name = material.index().map_or_else(|| "the material of what has none".to_owned(), |index| format!("materials.{index}"));
+        for (key, parts) in [("pbrMetallicRoughness.baseColorFactor", base), ("emissiveFactor", emitted)] {
+            if parts.iter().any(|part| !part.is_finite()) {
+                return Err(self.source.broken(format!("{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1")));
+            }
+            if parts.iter().any(|part| !(0.0..=1.0).contains(part)) {
+                self.notes.push(format!("{name}: {key} is {parts:?}: what is not within 0 to 1 is taken as the nearest that is"));
+            }
+        }
+        let cutoff = material.alpha_cutoff().unwrap_or(0.5);
+        if cutoff.is_finite() { Ok(()) } else { Err(self.source.broken(format!("{name}: alphaCutoff is {cutoff}, which is not finite"))) }
     }
 
     /// The material on a shape: what is to be blended and has no alpha below 1 anywhere hides what is behind it, and is drawn as what does.

@@ -1,6 +1,9 @@
 //! A primitive's triangles, with morph targets and skin applied.
 
-use std::ops::{Add, Mul};
+use std::{
+    cell::Cell,
+    ops::{Add, Mul},
+};
 
 use camsim_core::scene::{MeshVertex, Shape, light::turned_normal};
 use glam::{DAffine3, DMat3, DVec3};
@@ -39,6 +42,8 @@ pub(super) struct Making<'a> {
     pub joints: Option<&'a [DAffine3]>,
     /// Whether light will fall on it.
     pub normals: bool,
+    /// Becomes true where a vertex colour is not within 0 to 1.
+    pub beyond: &'a Cell<bool>,
 }
 
 impl Making<'_> {
@@ -62,6 +67,9 @@ impl Making<'_> {
             let [u, v] = uvs.as_ref().map_or([0.0; 2], |rows| [rows[i][0], rows[i][1]]);
             let [r, g, b, a] = colors.as_ref().map_or([1.0; 4], |rows| rows[i]);
             let color = [r, g, b, if with_alpha { a } else { 1.0 }];
+            if color.iter().any(|part| !(0.0..=1.0).contains(part)) {
+                self.beyond.set(true);
+            }
             let tint = std::array::from_fn(|k| (color[k] as f32 * self.uv.factor[k]).clamp(0.0, 1.0));
             MeshVertex { position_m: position.as_vec3().to_array(), uv: self.uv.apply([u, v]), tint }
         };

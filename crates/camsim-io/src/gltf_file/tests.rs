@@ -362,6 +362,25 @@ fn what_is_blended_is_mixed_where_any_of_it_is_clear() {
 }
 
 #[test]
+fn factors_beyond_what_there_is_are_named() {
+    let of = |material: &str| {
+        let rest = format!(r#", "material": 0 }}] }}], "materials": [{material}], "x": [{{ "y": [{{ "z": 1"#);
+        square_with(5, &rest, r#"{ "mesh": 0 }"#, GltfOptions::default())
+    };
+    let base = |factor: &str| of(&format!(r#"{{ "alphaMode": "BLEND", "pbrMetallicRoughness": {{ "baseColorFactor": {factor} }} }}"#));
+    assert!(base("[0, 1, 0.5, 0.25]").unwrap().notes.is_empty());
+    for factor in ["[1, 1, 1, 1.5]", "[1, 1, 1, -0.5]", "[2, 1, 1, 0.5]"] {
+        let notes = base(factor).unwrap().notes;
+        let named = |note: &String| ["materials.0:", "baseColorFactor", "nearest"].iter().all(|part| note.contains(part));
+        assert!(notes.len() == 1 && notes.iter().all(named), "{factor}: {notes:?}");
+    }
+    let error = base("[1, 1, 1, 1e39]").unwrap_err().to_string();
+    assert!(["materials.0:", "baseColorFactor", "not finite"].iter().all(|part| error.contains(part)), "{error}");
+    let notes = of(r#"{ "emissiveFactor": [3, 0, 0] }"#).unwrap().notes;
+    assert!(notes.len() == 1 && notes[0].starts_with("materials.0: emissiveFactor"), "{notes:?}");
+}
+
+#[test]
 fn a_real_model_blends_what_it_says() {
     let Some(data) = data() else { return };
     let model = read_gltf(&data.join("AlphaBlendModeTest/glTF-Binary/AlphaBlendModeTest.glb"), GltfOptions::default()).unwrap();

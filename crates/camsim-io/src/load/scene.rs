@@ -6,7 +6,7 @@ use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
     geodesy::{Geodetic, GeoidCache},
     scenario::{BoardSpec, GltfSpec, LightSpec, PatternCentre, Scenario},
-    scene::{Encoding, Light, Mesh, Scene, linear_from_srgb, ned_from_board, paint_order::MOST_TRIANGLES},
+    scene::{Encoding, Light, Mesh, Scene, cut_where_blended_cross, linear_from_srgb, ned_from_board, paint_order::MOST_TRIANGLES},
 };
 use glam::DVec3;
 
@@ -59,6 +59,10 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         notes.extend(add_model(scenario, log, spec, &mut scene)?);
     }
     notes.extend(too_many_to_order(&scene));
+    let left = cut_where_blended_cross(&mut scene.meshes).left;
+    notes.extend((left > 0).then(|| {
+        format!("scene.gltf: {left} places where blended triangles pass through each other are not cut, and may be mixed in the wrong order there")
+    }));
     Ok((scene, summary, notes))
 }
 
