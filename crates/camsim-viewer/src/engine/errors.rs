@@ -38,20 +38,26 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
     let [width, height] = image.size;
     let [columns, rows] = map.grid.map(|cells| cells.max(1) as usize);
     let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
-    let mut cells = vec![None::<f64>; columns * rows];
+    // Outer: whether a place lies there at all.
+    let mut cells = vec![None::<Option<f64>>; columns * rows];
     for place in &map.places {
         let [x, y] = place.pixel.map(|at| at as usize);
-        // A corner of the image is in one cell with another place: what is larger counts.
-        let (PlaceError::Within(px), Some(cell)) = (
-            place.error,
-            cells.get_mut((y * rows / height.max(1)).min(rows - 1) * columns + (x * columns / width.max(1)).min(columns - 1)),
-        ) else {
-            continue;
-        };
-        *cell = Some(cell.map_or(px, |known| known.max(px)));
+        let at = (y * rows / height.max(1)).min(rows - 1) * columns + (x * columns / width.max(1)).min(columns - 1);
+        let Some(cell) = cells.get_mut(at) else { continue };
+        let known = cell.flatten();
+        *cell = Some(match place.error {
+            // A corner of the image is in one cell with another place: what is larger counts.
+            PlaceError::Within(px) => Some(known.map_or(px, |known| known.max(px))),
+            _ => known,
+        });
     }
+    // On a border between cells a pixel is in just one of them: the other has what is around.
+    let around = |at: usize| {
+        map.around_px([(at % columns * 2 + 1) * width / (2 * columns), (at / columns * 2 + 1) * height / (2 * rows)].map(|v| v as u32))
+    };
+    let cells = cells.into_iter().enumerate().map(|(at, cell)| cell.unwrap_or_else(|| around(at)));
     let colors: Vec<Option<[u8; 3]>> =
-        cells.into_iter().map(|cell| cell.map(|px| ramp(if px > 0.0 { share_of_scale(px, largest_px) } else { 0.0 }))).collect();
+        cells.map(|cell| cell.map(|px| ramp(if px > 0.0 { share_of_scale(px, largest_px) } else { 0.0 }))).collect();
     let pixels = image.pixels.iter().enumerate().map(|(i, pixel)| {
         if pixel.a() == 0 {
             return Color32::TRANSPARENT;
