@@ -57,6 +57,7 @@ pub use contours::Contours;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
+pub use error::{ErrorMap, ErrorPlace, PlaceError};
 pub use frame_plan::{FramePlan, Motion, Skip};
 pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};

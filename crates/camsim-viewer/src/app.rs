@@ -10,6 +10,7 @@ use camsim_core::sequence::Sequence;
 use eframe::egui;
 
 use crate::{
+    drop,
     engine::{ExactWanted, Handle, Picture, Wanted},
     export::Exporter,
     message::{Message, Outbox},
@@ -172,5 +173,7 @@ impl eframe::App for Viewer {
 
 fn take_drops(context: &egui::Context, out: &mut Outbox) {
     let dropped = context.input(|input| input.raw.dropped_files.clone());
-    out.extend(dropped.iter().map(|file| Message::Drop(file.path().to_path_buf())));
+    let mut paths: Vec<PathBuf> = dropped.iter().map(|file| file.path().to_path_buf()).collect();
+    paths.sort_by_key(|path| drop::rank(path));
+    out.extend(paths.into_iter().map(Message::Drop));
 }

@@ -17,8 +17,30 @@ pub const PICTURE_USES: [(&str, &str); 3] = [
     ("pattern", "scene.pattern.image"),
 ];
 
+/// The order in which files that are dropped together are taken: a scenario before what becomes part of it.
+pub fn rank(path: &Path) -> u8 {
+    let is_toml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+    u8::from(!is_toml || is_camera(path))
+}
+
+/// Why a path cannot be taken whatever it is, if so: else a scenario would be left with something that cannot be loaded.
+fn hindrance(path: &Path) -> Option<String> {
+    let name = path.display();
+    match std::fs::metadata(path) {
+        Err(error) => Some(format!("{name}: {error}; put the file back and drop it again")),
+        Ok(what) if what.is_dir() => {
+            Some(format!("{name} is a folder: drop the scenario, log, calibration, picture or model that is in it"))
+        }
+        Ok(what) if what.len() == 0 => Some(format!("{name} is empty: nothing was changed")),
+        Ok(_) => None,
+    }
+}
+
 /// Scenario, calibration, log or picture.
 pub fn take(state: &mut State, path: &Path) {
+    if let Some(hindrance) = hindrance(path) {
+        return state.notice(hindrance);
+    }
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
     match ending.as_str() {
         "toml" if is_camera(path) => camera(state, read_checked_camera(path).map_err(|error| error.to_string())),
@@ -28,9 +50,13 @@ pub fn take(state: &mut State, path: &Path) {
         "yaml" | "yml" | "xml" | "json" => camera(state, import_camera(path).map_err(|error| error.to_string())),
         "csv" | "txt" | "tum" | "log" => set(state, "flight.log", path),
         "png" | "jpg" | "jpeg" | "bmp" | "gif" | "pgm" | "ppm" => {
-            state.dropped_picture = state.document.is_some().then(|| path.into());
-            if state.dropped_picture.is_none() {
+            if state.document.is_none() {
                 state.notice(no_scenario(path));
+            } else if let Some(waiting) = &state.dropped_picture {
+                let told = format!("{}: say first what {} is for, then drop it again", path.display(), waiting.display());
+                state.notice(told);
+            } else {
+                state.dropped_picture = Some(path.into());
             }
         }
         "glb" | "gltf" => model(state, path),

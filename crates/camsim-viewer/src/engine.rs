@@ -5,6 +5,7 @@
 //! one queue, in order, and a hand that moves on must not wait for a full frame, nor the window for either. Finished pictures cross by way of
 //! the host, as `camsim render` reads them. What is loaded is shared.
 
+mod errors;
 mod exact;
 mod library;
 mod mailbox;
@@ -21,6 +22,7 @@ use std::{
     },
 };
 
+pub use errors::{DECADES, Errors};
 use library::Library;
 pub use mailbox::Mailbox;
 pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Wanted};

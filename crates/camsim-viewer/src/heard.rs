@@ -7,7 +7,7 @@ use camsim_io::load::Loaded;
 use eframe::egui;
 
 use crate::{
-    engine::{Difference, ExactPicture, FrameReply, Picture, Reply, Size, Stage},
+    engine::{Difference, Errors, ExactPicture, FrameReply, Picture, Reply, Size, Stage},
     sheet::Sheet,
 };
 
@@ -46,6 +46,8 @@ pub struct Shown {
     pub difference: Option<Sheet>,
     /// The depth there.
     pub depth: Option<Sheet>,
+    /// The predicted errors there, one for each picture, if they were wanted.
+    pub errors: Vec<Sheet>,
 }
 
 /// The oracle's picture, as far as it has come.
@@ -71,6 +73,8 @@ pub struct Sight<'a> {
     pub stage: Stage,
     /// How it was made; the oracle has no plan.
     pub plan: Option<&'a FramePlan>,
+    /// Its predicted error from place to place, if that was wanted, and on the screen.
+    pub errors: Option<(&'a Errors, &'a Sheet)>,
 }
 
 impl Heard {
@@ -83,6 +87,8 @@ impl Heard {
             Reply::Loaded(loaded) => self.loaded = Some(loaded),
             Reply::Looks(looks) => self.looks = Some(looks),
             Reply::Failed(fault) => self.fault = Some(fault),
+            // The state keeps it.
+            Reply::Told(_) => {}
             Reply::Frame(reply) => {
                 if let Some(took) = reply.took {
                     let of_size = match reply.wanted.size {
@@ -115,12 +121,13 @@ impl Heard {
         if stage == Stage::Oracle {
             let Exact { picture, sheet, .. } = self.current_exact()?;
             let size_px = picture.sequence.scenario.camera.size_px;
-            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None });
+            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None, errors: None });
         }
         let at = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
         let (picture, sheet) = (shown.reply.pictures.get(at)?, shown.sheets.get(at)?);
         let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
-        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan) })
+        let errors = shown.reply.errors.get(at).map(|errors| &**errors).zip(shown.errors.get(at));
+        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan), errors })
     }
 
     /// Path time of a frame's stamp, seconds.
@@ -169,13 +176,16 @@ impl Heard {
 
 impl Shown {
     fn new(reply: FrameReply, before: Option<Self>, context: &egui::Context) -> Self {
-        let (old, old_difference, old_depth) =
-            before.map_or((Vec::new(), None, None), |before| (before.sheets, before.difference, before.depth));
+        let (old, old_difference, old_depth, old_errors) =
+            before.map_or((Vec::new(), None, None, Vec::new()), |before| (before.sheets, before.difference, before.depth, before.errors));
         let mut old = old.into_iter();
         let sheets = reply.pictures.iter().map(|picture| Sheet::new(context, "picture", picture.image.clone(), old.next())).collect();
         let difference =
             reply.difference.as_ref().map(|difference| Sheet::new(context, "difference", difference.image.clone(), old_difference));
         let depth = reply.truth.as_ref().map(|truth| Sheet::new(context, "depth", truth.image.clone(), old_depth));
-        Self { reply, sheets, difference, depth }
+        let mut old_errors = old_errors.into_iter();
+        let errors =
+            reply.errors.iter().map(|errors| Sheet::new(context, "predicted error", errors.image.clone(), old_errors.next())).collect();
+        Self { reply, sheets, difference, depth, errors }
     }
 }

@@ -17,7 +17,7 @@ use crate::{
     message::{Message, Question},
     settings::Settings,
     timeline::Timeline,
-    view::{Compare, View},
+    view::{Compare, Tab, View},
 };
 
 /// A hand rests when it has done nothing for so long, seconds.
@@ -129,7 +129,10 @@ impl State {
         if self.is_out_of_date(&reply) {
             return;
         }
-        self.heard.take(reply, context);
+        match reply {
+            Reply::Told(text) => self.notice(text),
+            reply => self.heard.take(reply, context),
+        }
         if let Some(sequence) = self.heard.sequence() {
             self.timeline.fit(sequence.frames, sequence.scenario.camera.fps);
         }
@@ -165,6 +168,7 @@ impl State {
             stages,
             size: if moving || playing { Size::Preview } else { Size::Full },
             truth: self.view.overlays.depth,
+            errors: self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel,
         })
     }
 

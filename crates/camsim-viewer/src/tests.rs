@@ -1,5 +1,6 @@
 //! The whole window, headless, against the real engine on a software adapter.
 
+mod drops;
 mod editing;
 pub mod harness;
 mod leaving;

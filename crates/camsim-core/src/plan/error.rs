@@ -4,6 +4,8 @@
 //! rays (`dry_run.rs`), and what single precision adds comes from the sizes of the numbers (`rounding.rs`). The largest error of n probes
 //! is above the 99th percentile of all pixels with a probability of `1 - 0.99^n` (98.7 % of 432); what it misses is what [`SAFETY`] is for.
 
+mod map;
+
 use std::sync::OnceLock;
 
 use rayon::prelude::*;
@@ -18,6 +20,7 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::{
+    mount::CameraPath,
     pose::CameraPose,
     scenario::{Auto, Preset},
     scene::TerrainDetail,
@@ -28,6 +31,8 @@ use crate::{
         displacement::{RK2_STEP_DEG, Twist},
     },
 };
+
+pub use map::{ErrorMap, ErrorPlace, PlaceError};
 
 /// Times the largest error found.
 const SAFETY: f64 = 1.25;
@@ -187,10 +192,8 @@ impl<'a> Case<'a> {
         matches!(self.demanded, Some(TemporalStage::Linear | TemporalStage::Rk2)) || self.demanded.is_none() && self.may_take_twist()
     }
 
-    /// The choice that the ideal pass will make.
     fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'a>> {
-        let terrain = self.sequence.scene.terrain.as_ref()?;
-        Some(TerrainDetail::new(terrain, self.key_pose, self.ideal.tangents(), self.ideal.focal_px.max_element(), max_error_px))
+        terrain_detail(self.sequence, self.key_pose, self.ideal, max_error_px)
     }
 
     /// With an exposure that shows, the probes take turns in trying its [`PHASES`].
@@ -206,12 +209,27 @@ impl<'a> Case<'a> {
             twist: self.asks_for_twist().then_some(self.key_twist),
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
         };
-        let phases = match self.blur {
-            None => &PHASES[..1],
-            Some(_) if self.sequence.path.highest_vibration_hz() > 0.0 => &PHASES[..],
-            Some(_) => &PHASES[..AT_REST],
-        };
-        Truths::new(self.reach, self.ray, trial, phases, 1)
+        Truths::new(self.reach, self.ray, trial, phases(&self.sequence.path, self.blur.is_some()), 1)
+    }
+}
+
+/// The choice that the ideal pass will make.
+fn terrain_detail<'a>(
+    sequence: &'a Sequence,
+    key_pose: &CameraPose,
+    ideal: &IdealGeometry,
+    max_error_px: f64,
+) -> Option<TerrainDetail<'a>> {
+    let terrain = sequence.scene.terrain.as_ref()?;
+    Some(TerrainDetail::new(terrain, key_pose, ideal.tangents(), ideal.focal_px.max_element(), max_error_px))
+}
+
+/// Instants of the exposure that probes take turns in.
+fn phases(path: &CameraPath, is_exposed: bool) -> &'static [f64] {
+    match is_exposed {
+        false => &PHASES[..1],
+        true if path.highest_vibration_hz() > 0.0 => &PHASES,
+        true => &PHASES[..AT_REST],
     }
 }
 

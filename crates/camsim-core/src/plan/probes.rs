@@ -25,7 +25,7 @@ pub(super) struct Probe {
 /// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only pixels that have a ray.
 pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
     let [width, height] = camera.size_px;
-    let [columns, rows] = [GRID[0].min(width), GRID[1].min(height)];
+    let [columns, rows] = grid(camera);
     let inside = (0..rows).flat_map(|j| {
         (0..columns).map(move |i| {
             let k = f64::from(j * columns + i) + 0.5;
@@ -36,6 +36,11 @@ pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
     });
     let corners = [[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]];
     inside.chain(corners).filter_map(|pixel| probe(camera, pixel)).collect()
+}
+
+/// Columns and rows of probes: no more than there are pixels.
+pub(super) fn grid(camera: &CameraModel) -> [u32; 2] {
+    [0, 1].map(|axis: usize| GRID[axis].min(camera.size_px[axis]))
 }
 
 /// Side of the part of the image that a probe stands for, pixels.

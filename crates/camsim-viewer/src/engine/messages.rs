@@ -6,7 +6,10 @@ use camsim_core::{reference::Oracle, scenario::Scenario, sequence::Sequence};
 use camsim_io::load::Loaded;
 use eframe::egui::ColorImage;
 
-use super::picture::{Difference, Picture};
+use super::{
+    errors::Errors,
+    picture::{Difference, Picture},
+};
 
 /// How much of the camera's imperfections is in a picture, in the order of the pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
@@ -74,6 +77,8 @@ pub struct Wanted {
     pub size: Size,
     /// Whether depth is wanted too.
     pub truth: bool,
+    /// Whether the predicted error from place to place is wanted too.
+    pub errors: bool,
     /// Enlargement of the difference of the two stages, if it is wanted.
     pub gain: Option<f32>,
 }
@@ -106,6 +111,8 @@ pub enum Reply {
     Exact(Box<ExactPicture>),
     /// What went wrong, and what to do.
     Failed(String),
+    /// What happened and is over, until somebody has read it.
+    Told(String),
 }
 
 /// Depth of a frame, beside its picture.
@@ -128,6 +135,8 @@ pub struct FrameReply {
     pub pictures: Vec<Arc<Picture>>,
     /// Depth, if wanted.
     pub truth: Option<Arc<Truth>>,
+    /// What is predicted of each of the pictures, if wanted.
+    pub errors: Vec<Arc<Errors>>,
     /// The difference of the two pictures, if wanted.
     pub difference: Option<Arc<Difference>>,
     /// From taking up the request to this reply; `None` if all of it was there already.

@@ -1,8 +1,13 @@
 //! A thread that renders pictures.
 
-use std::{convert::Infallible, sync::Arc, time::Instant};
+use std::{
+    convert::Infallible,
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::Arc,
+    time::Instant,
+};
 
-use camsim_core::{mount::CameraPath, scenario::Channel, sequence::Sequence};
+use camsim_core::{mount::CameraPath, plan::PlanError, scenario::Channel, sequence::Sequence};
 use camsim_gpu::{
     AdapterChoice, Engine, GpuError, RenderError,
     engine::{Finished, Session},
@@ -11,6 +16,7 @@ use camsim_io::load::LoadError;
 
 use super::{
     Speaker,
+    errors::Errors,
     library::Library,
     mailbox::Mailbox,
     messages::{FrameReply, Reply, Size, Stage, Truth, Wanted},
@@ -30,6 +36,10 @@ enum Fault {
     Mount(#[from] camsim_core::mount::MountError),
     #[error(transparent)]
     Render(#[from] RenderError<Infallible>),
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    #[error("the renderer stopped at a fault of its own; the next change is tried on a device opened anew")]
+    Stopped,
     #[error("frame {0} was not rendered; move the timeline to try again")]
     Missing(u64),
 }
@@ -37,7 +47,7 @@ enum Fault {
 impl Fault {
     /// After which nothing works on this device.
     fn is_of_device(&self) -> bool {
-        matches!(self, Self::Render(RenderError::Gpu(GpuError::Device(_))))
+        matches!(self, Self::Stopped | Self::Render(RenderError::Gpu(GpuError::Device(_))))
     }
 }
 
@@ -67,8 +77,12 @@ fn run_on(open: impl Fn() -> Result<Engine, GpuError>, mailbox: &Mailbox<Wanted>
         let mut worker = Worker { engine: &engine, speaker, library, session: None, kept: Vec::new(), rendered: 0 };
         loop {
             let Some(wanted) = waiting.take().or_else(|| mailbox.take()) else { return };
-            let Err(fault) = worker.serve(&wanted, mailbox) else {
-                lost_with = None;
+            // wgpu panics where a device goes while something is made on it.
+            let served = catch_unwind(AssertUnwindSafe(|| worker.serve(&wanted, mailbox))).unwrap_or(Err(Fault::Stopped));
+            let Err(fault) = served else {
+                if lost_with.take().is_some_and(|lost| lost == wanted) {
+                    speaker.say(Reply::Told("the graphics device was lost; the frame is of another one, opened anew".into()));
+                }
                 continue;
             };
             speaker.say(Reply::Busy(String::new()));
@@ -90,6 +104,7 @@ struct Kept {
     stage: Stage,
     size: Size,
     picture: Arc<Picture>,
+    errors: Option<Arc<Errors>>,
 }
 
 struct Worker<'a> {
@@ -102,7 +117,7 @@ struct Worker<'a> {
     rendered: u64,
 }
 
-impl Worker<'_> {
+impl<'a> Worker<'a> {
     fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
         let (begun, before) = (Instant::now(), self.rendered);
         let loaded = self.library.load(wanted, self.speaker)?;
@@ -117,12 +132,18 @@ impl Worker<'_> {
             pictures.push(self.picture(sequence, stage, wanted.size, frame)?);
         }
         let truth = if wanted.truth { Some(Arc::new(self.truth(sequence, wanted.size, frame)?)) } else { None };
+        let mut errors = Vec::new();
+        if wanted.errors {
+            for picture in &pictures {
+                errors.push(self.errors(sequence, wanted.size, picture)?);
+            }
+        }
         let difference = match (wanted.gain, pictures.as_slice()) {
             (Some(gain), [a, b]) => difference(a.frame.size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain).map(Arc::new),
             _ => None,
         };
         let took = (self.rendered > before).then(|| begun.elapsed());
-        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, difference, took };
+        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, errors, difference, took };
         self.speaker.say(Reply::Frame(Box::new(reply)));
         Ok(())
     }
@@ -141,7 +162,7 @@ impl Worker<'_> {
         if self.kept.len() >= KEPT {
             self.kept.remove(0);
         }
-        self.kept.push(Kept { sequence: sequence.clone(), stage, size, picture: picture.clone() });
+        self.kept.push(Kept { sequence: sequence.clone(), stage, size, picture: picture.clone(), errors: None });
         Ok(picture)
     }
 
@@ -152,9 +173,37 @@ impl Worker<'_> {
         Ok(Truth { depth_m, image })
     }
 
+    /// What is predicted of a picture, from place to place.
+    fn errors(&mut self, sequence: &Arc<Sequence>, size: Size, picture: &Arc<Picture>) -> Result<Arc<Errors>, Fault> {
+        let of_picture = |kept: &&mut Kept| Arc::ptr_eq(&kept.picture, picture);
+        if let Some(errors) = self.kept.iter_mut().find(of_picture).and_then(|kept| kept.errors.clone()) {
+            return Ok(errors);
+        }
+        let planned = variant(sequence, picture.stage, size)?;
+        let map = self.session(&planned, &[Channel::Color])?.planner().error_map(&picture.plan)?;
+        let errors = Arc::new(Errors::new(picture, map));
+        if let Some(kept) = self.kept.iter_mut().find(of_picture) {
+            kept.errors = Some(errors.clone());
+        }
+        Ok(errors)
+    }
+
     /// One frame, by the session that there is.
     fn render(&mut self, sequence: &Arc<Sequence>, channels: &[Channel], frame: u64) -> Result<Finished, Fault> {
-        let session = match &mut self.session {
+        let session = self.session(sequence, channels)?;
+        let mut done = None;
+        let mut keep = |finished| {
+            done = Some(finished);
+            Ok(())
+        };
+        session.render::<Infallible>([frame], &mut keep)?;
+        self.rendered += 1;
+        done.ok_or(Fault::Missing(frame))
+    }
+
+    /// The session, for the frames of a sequence.
+    fn session(&mut self, sequence: &Arc<Sequence>, channels: &[Channel]) -> Result<&mut Session<'a>, Fault> {
+        Ok(match &mut self.session {
             Some(session) => {
                 let planner = session.planner();
                 let truth = channels.contains(&Channel::Depth);
@@ -169,15 +218,7 @@ impl Worker<'_> {
                 self.speaker.say(Reply::Busy(String::new()));
                 none.insert(session)
             }
-        };
-        let mut done = None;
-        let mut keep = |finished| {
-            done = Some(finished);
-            Ok(())
-        };
-        session.render::<Infallible>([frame], &mut keep)?;
-        self.rendered += 1;
-        done.ok_or(Fault::Missing(frame))
+        })
     }
 }
 

@@ -89,7 +89,8 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
         painter.rect_filled(placement.picture_rect(sight.size_px), 0.0, Color32::from_rgb(255, 0, 0));
     }
     let depth = state.heard.shown.as_ref().and_then(|shown| shown.depth.as_ref()).filter(|_| state.view.overlays.depth);
-    placement.image(&painter, place, depth.unwrap_or(sight.sheet), sight.size_px);
+    let errors = sight.errors.filter(|_| state.view.overlays.error).map(|(_, sheet)| sheet);
+    placement.image(&painter, place, depth.or(errors).unwrap_or(sight.sheet), sight.size_px);
     overlays::draw(&painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())), placement, state, &sight);
     let corner = clip.intersect(placement.pane).left_top() + egui::vec2(6.0, 4.0);
     label(&painter, corner, &format!("{place:?}: {}{}", stage.label(), progress(state, &sight)));

@@ -100,7 +100,7 @@ fn geometry(ui: &mut Ui, state: &State, pixel: [u32; 2], plan: Option<&FramePlan
         }
     });
     if let Some(plan) = plan {
-        certainty(ui, plan);
+        certainty(ui, plan, predicted_here(state, pixel));
     }
 }
 
@@ -202,12 +202,36 @@ fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
     );
 }
 
-fn certainty(ui: &mut Ui, plan: &FramePlan) {
+/// The predicted error around a pixel, if it is known.
+fn predicted_here(state: &State, [x, y]: [u32; 2]) -> Option<String> {
+    let shown = state.heard.shown.as_ref()?;
+    let errors = shown.reply.errors.first()?;
+    let is_preview = shown.reply.wanted.size == crate::engine::Size::Preview;
+    let full = state.heard.sequence()?.scenario.camera.size_px;
+    let factor = if is_preview { crate::engine::preview_factor(full) } else { 1 };
+    let around_px = errors.map.around_px([x / factor, y / factor]);
+    Some(around_px.map_or_else(|| "counted apart: silhouettes around".to_owned(), |px| format!("{px:.5} px")))
+}
+
+fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
     ui.separator();
     ui.strong("as rendered");
     facts(ui, "certainty", |ui| {
         let predicted = &plan.predicted;
-        fact(ui, "predicted error", format!("{:.4} px", predicted.total_px), "bound on 99 % of the pixels' source coordinates");
+        if let Some(here) = here {
+            fact(
+                ui,
+                "predicted here",
+                here,
+                "largest error of the source coordinate in the plan's dry runs around this pixel, with their safety; pixels at mid-exposure are below it but for about one in a hundred",
+            );
+        }
+        fact(
+            ui,
+            "predicted error",
+            format!("{:.4} px", predicted.total_px),
+            "of the frame: bound on 99 % of its pixels' source coordinates",
+        );
         fact(
             ui,
             "of grey levels",

@@ -86,7 +86,7 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     for (name, text, told) in [
         ("bad.toml", "[flight]\nlgo = \"x\"\n[scene]\n", "bad.toml:2"),
         ("bad.yaml", "nonsense: [", "bad.yaml"),
-        ("picture.xyz", "", "picture.xyz"),
+        ("picture.xyz", "x", "picture.xyz"),
     ] {
         let path = write(name, text);
         send(&mut window, Message::Drop(path));
@@ -103,9 +103,9 @@ fn dropped_files_find_their_place_and_bad_ones_are_told() {
     let camera = write("camera.toml", "size_px = [320, 240]\nfocal_px = [200.0, 200.0]\n");
     send(&mut window, Message::Drop(camera));
     assert_eq!(window.state().document.as_ref().expect("open").scenario.camera.size_px, [320, 240], "{:?}", window.state().notices);
-    let log = write("empty.csv", "");
+    let log = write("none.csv", "this is,no log\n");
     send(&mut window, Message::Drop(log));
-    window.wait("the fault", |state| state.heard.fault.as_deref().is_some_and(|fault| fault.contains("empty.csv")));
+    window.wait("the fault", |state| state.heard.fault.as_deref().is_some_and(|fault| fault.contains("none.csv")));
     send(&mut window, Message::Undo);
     window.settle();
     assert!(window.state().heard.fault.is_none());

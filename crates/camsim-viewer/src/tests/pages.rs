@@ -29,6 +29,13 @@ fn the_inspector_tells_what_the_pixel_sees() {
     let [r, g, b, a] = window.state().heard.picture().expect("a picture").image.pixels[400 * 640 + 300].to_array();
     assert_eq!(a, 255);
     assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
+    // Asked for with the pixel: what the plan's dry runs around it say, which the oracle's source bears out.
+    window.settle_exact();
+    let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
+    let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
+    let around_px = map.around_px(pixel).expect("ground");
+    assert!(around_px > 0.0 && around_px <= map.largest_px() && (map.largest_px() - plan.predicted.total_px).abs() < 1e-9);
+    assert!(has(&window, &format!("{around_px:.5} px")), "what is predicted here");
     window.harness.key_press(Key::Escape);
     window.step();
     assert_eq!(window.state().pinned, None);

@@ -141,10 +141,12 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
         ("error", Overlays { error: true, ..Overlays::default() }),
     ] {
         window.state_mut().view.overlays = only;
-        window.step();
+        // Some are asked for.
+        window.settle();
         assert_ne!(window.picture(), plain, "{name} shows");
     }
     window.state_mut().view.overlays = overlays;
+    window.settle();
     window.step();
     let part = window.harness.get_by_label("picture").rect();
     window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));

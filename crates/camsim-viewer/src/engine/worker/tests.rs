@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 fn wanted(frame: u64) -> Wanted {
     let scenario = Arc::new(read_scenario(&pattern(), &[], None).expect("legal"));
-    Wanted { scenario, reading: 0, frame, stages: vec![Stage::Photometric], size: Size::Preview, truth: false, gain: None }
+    Wanted { scenario, reading: 0, frame, stages: vec![Stage::Photometric], size: Size::Preview, truth: false, errors: false, gain: None }
 }
 
 /// The next picture, with the faults that were told before it.
@@ -81,32 +81,55 @@ fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn a_device_that_is_lost_before_its_first_frame_is_told_too_and_the_thread_goes_on() {
-    let (sender, replies) = channel();
-    let speaker = Speaker { replies: sender, repaint: Arc::new(|| {}) };
-    let (mailbox, opened) = (Arc::new(Mailbox::default()), Arc::new(Mutex::new(0)));
-    let body = {
-        let (mailbox, opened, voice, library) = (mailbox.clone(), opened.clone(), speaker.clone(), Library::default());
-        move || {
-            let open = || {
-                let engine = Engine::new(AdapterChoice::Best)?;
-                let mut opened = opened.lock().expect("one at a time");
-                *opened += 1;
-                if *opened == 1 {
-                    engine.gpu().device.destroy();
-                }
-                Ok(engine)
-            };
-            run_on(open, &mailbox, &library, &voice);
+fn a_device_that_is_lost_while_its_session_is_made_is_told_and_the_frame_comes_from_another() {
+    let opened = Mutex::new(0);
+    let open = || {
+        let engine = Engine::new(AdapterChoice::Best)?;
+        let mut opened = opened.lock().expect("one at a time");
+        *opened += 1;
+        if *opened == 1 {
+            engine.gpu().device.destroy();
         }
+        Ok(engine)
     };
-    super::super::spawn("camsim lost", speaker, body);
-    mailbox.put(wanted(0));
-    while !matches!(replies.recv_timeout(PATIENCE).expect("a reply"), Reply::Failed(_)) {}
-    mailbox.put(wanted(1));
-    let (reply, _) = next(&replies);
-    assert_eq!((reply.frame, *opened.lock().expect("one at a time")), (1, 2));
-    mailbox.close();
+    with_worker(open, |mailbox, replies| {
+        mailbox.put(wanted(1));
+        let (reply, faults) = next(replies);
+        assert_eq!((reply.frame, *opened.lock().expect("one at a time"), faults.len()), (1, 2, 1), "{faults:?}");
+        match replies.recv_timeout(PATIENCE).expect("a word about it") {
+            Reply::Told(text) => assert!(text.contains("lost"), "{text}"),
+            other => panic!("{other:?}"),
+        }
+    });
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_frame_that_loses_every_device_is_tried_twice_and_the_thread_goes_on() {
+    let opened = Mutex::new(0);
+    let open = || {
+        let engine = Engine::new(AdapterChoice::Best)?;
+        let mut opened = opened.lock().expect("one at a time");
+        *opened += 1;
+        if *opened <= 2 {
+            engine.gpu().device.destroy();
+        }
+        Ok(engine)
+    };
+    with_worker(open, |mailbox, replies| {
+        mailbox.put(wanted(0));
+        let mut faults = 0;
+        while faults < 2 {
+            match replies.recv_timeout(PATIENCE).expect("a reply") {
+                Reply::Failed(_) => faults += 1,
+                Reply::Frame(reply) => panic!("from no device: {reply:?}"),
+                _ => {}
+            }
+        }
+        mailbox.put(wanted(1));
+        let (reply, more) = next(replies);
+        assert_eq!((reply.frame, more.len(), *opened.lock().expect("one at a time")), (1, 0, 3), "{more:?}");
+    });
 }
 
 #[test]

@@ -1,18 +1,23 @@
 //! What is drawn over a picture.
 
-use camsim_core::camera::CameraModel;
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Shape, Stroke, pos2};
+use camsim_core::{camera::CameraModel, plan::ErrorMap};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 use glam::DVec2;
 
 use super::canvas::Placement;
-use crate::{engine::Stage, heard::Sight, motion, panes::ramp_color, state::State};
+use crate::{
+    engine::{DECADES, Stage},
+    heard::Sight,
+    motion,
+    panes::ramp_color,
+    state::State,
+};
 
-/// Times that the predicted error is enlarged.
-const ERROR_SCALE: f64 = 200.0;
 /// Times that ways are enlarged: most are of a pixel.
 const MOTION_SCALE: f64 = 8.0;
-/// Circles of the predicted error across the picture.
-const CIRCLES: [u32; 2] = [12, 9];
+/// Points of the scale of colours, and its steps.
+const SCALE: [f32; 2] = [120.0, 8.0];
+const SCALE_STEPS: u8 = 24;
 /// Lines of the distortion grid over the picture's width, and points of each.
 const GRID_LINES: i32 = 16;
 const GRID_POINTS: i32 = 96;
@@ -33,11 +38,11 @@ pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &Sig
         row_times(painter, placement, &sequence.scenario.camera);
     }
     if overlays.error
-        && let Some(plan) = sight.plan
+        && let (Some(plan), Some((errors, _))) = (sight.plan, sight.errors)
     {
         // A preview's pixels are larger.
         let factor = f64::from(placement.size_px[0]) / f64::from(sight.size_px[0].max(1));
-        errors(painter, placement, factor * plan.predicted.total_px);
+        error_scale(painter, placement, factor, &errors.map, plan.predicted.total_px);
     }
 }
 
@@ -108,7 +113,7 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
         let t_s = mids.get(y as usize).copied().unwrap_or_default();
         let share = if last_s > first_s { (t_s - first_s) / (last_s - first_s) } else { 0.5 };
         let (top, bottom) = (placement.screen(0.0, f64::from(y) - 0.5).y, placement.screen(0.0, f64::from(y + step) - 0.5).y);
-        painter.rect_filled(eframe::egui::Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
+        painter.rect_filled(Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
     }
     for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
         let seen = placement.rect().intersect(placement.pane).shrink(7.0);
@@ -118,23 +123,23 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
     }
 }
 
-fn errors(painter: &Painter, placement: &Placement, error_px: f64) {
-    let radius = (ERROR_SCALE * error_px) as f32 * placement.scale;
-    let stroke = Stroke::new(1.0, Color32::from_rgb(255, 90, 200));
-    let [width, height] = placement.size_px.map(f64::from);
-    for y in 0..CIRCLES[1] {
-        for x in 0..CIRCLES[0] {
-            let at = placement
-                .screen(width * (f64::from(x) + 0.5) / f64::from(CIRCLES[0]), height * (f64::from(y) + 0.5) / f64::from(CIRCLES[1]));
-            painter.circle_stroke(at, radius, stroke);
-        }
+/// What the colours mean, and the bound for the frame as a whole. `factor`: of the camera's pixels to the picture's.
+fn error_scale(painter: &Painter, placement: &Placement, factor: f64, map: &ErrorMap, total_px: f64) {
+    let largest_px = factor * map.known().map(|(_, px)| px).fold(0.0, f64::max);
+    let seen = placement.rect().intersect(placement.pane);
+    let low = pos2(seen.left() + 6.0, seen.bottom() - 38.0);
+    let ground = Rect::from_min_size(low - vec2(4.0, 4.0), vec2(360.0, 40.0)).intersect(seen);
+    painter.rect_filled(ground, 3.0, Color32::from_black_alpha(170));
+    let step = SCALE[0] / f32::from(SCALE_STEPS);
+    let least = format!("{:.1e}", largest_px * 10.0_f64.powf(-DECADES));
+    let text = |at: Pos2, text: String| painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(12.0), Color32::WHITE);
+    let middle = low.y + 0.5 * SCALE[1];
+    let left = text(pos2(low.x, middle), least).right() + 6.0;
+    for i in 0..SCALE_STEPS {
+        let share = (f64::from(i) + 0.5) / f64::from(SCALE_STEPS);
+        let rect = Rect::from_min_size(pos2(left + f32::from(i) * step, low.y), vec2(step + 0.5, SCALE[1]));
+        painter.rect_filled(rect, 0.0, ramp_color(share));
     }
-    let at = placement.rect().intersect(placement.pane).left_bottom();
-    painter.text(
-        pos2(at.x + 6.0, at.y - 4.0),
-        Align2::LEFT_BOTTOM,
-        format!("99 % of the pixels within {error_px:.4} px"),
-        FontId::proportional(12.0),
-        stroke.color,
-    );
+    text(pos2(left + SCALE[0] + 6.0, middle), format!("{largest_px:.1e} px predicted; grey: counted apart"));
+    text(pos2(low.x, low.y + 22.0), format!("99 % of the frame's pixels within {:.4} px", factor * total_px));
 }

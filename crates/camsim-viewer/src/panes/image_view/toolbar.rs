@@ -84,6 +84,6 @@ fn overlays(ui: &mut Ui, view: &mut View) {
     );
     ui.toggle_value(&mut over.rows, "row times").on_hover_text("mid-exposure of each row after the stamp");
     ui.toggle_value(&mut over.error, "predicted error")
-        .on_hover_text("circles of the bound on the source coordinate's error, 200 times as large");
+        .on_hover_text("colours of the error of source coordinates that is predicted where the plan tried its methods: bright is large");
     ui.toggle_value(&mut over.depth, "depth").on_hover_text("planar depth in place of colour: near is bright");
 }

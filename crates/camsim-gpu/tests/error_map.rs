@@ -1,0 +1,152 @@
+//! The predicted error from place to place: its largest is the plan's, and pixels are off by no more than the places around them say.
+
+mod common;
+
+use std::sync::Arc;
+
+use camsim_core::{
+    noise::pcg4d,
+    plan::{ErrorMap, FramePlan, Planner, TemporalStage},
+    reference::{KeyFrame, Oracle},
+    scenario::{Auto, Channel, LensModel, LensSpec, Scenario, ShutterSpec, Solver},
+    scene::{Scene, Terrain},
+    sequence::Sequence,
+};
+use common::{city, engine, pattern, render, scenario, sequence, steady};
+use glam::{DVec2, DVec3};
+
+/// Pixels that are looked at.
+const PIXELS: u32 = 3000;
+
+/// Rough ground of 4 km.
+fn hills() -> Scene {
+    const SIDE: u32 = 257;
+    let height = |i: u32| {
+        let (x, y) = (f64::from(i % SIDE), f64::from(i / SIDE));
+        let [noise, ..] = pcg4d([i, 7, 3, 1]);
+        60.0 * (0.05 * x).sin() * (0.04 * y).cos() + 12.0 * (0.31 * x + 0.2 * y).sin() + 3.0 * (f64::from(noise >> 8) / 1.6e7 - 0.5)
+    };
+    let heights: Vec<f64> = (0..SIDE * SIDE).map(height).collect();
+    Scene { terrain: Some(Terrain::from_heights(SIDE, SIDE, 16.0, &heights, None).expect("a terrain")), ..Scene::default() }
+}
+
+fn camera() -> Scenario {
+    let mut scenario = scenario();
+    let camera = &mut scenario.camera;
+    (camera.size_px, camera.focal_px) = ([320, 240], [154.0, 154.0]);
+    camera.lens =
+        LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.390_024, 0.111_124, -0.001_274_4, -0.008_151_7, -0.008_427_63] };
+    camera.mount.angles_deg = [3.0, -75.0, 0.0];
+    camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms: 8.0, ..ShutterSpec::default() };
+    scenario
+}
+
+fn flown(scenario: Scenario, scene: Scene) -> Arc<Sequence> {
+    sequence(scenario, steady(260.0, 20.0, DVec3::new(30.0, 40.0, 5.0), DVec3::new(0.3, -0.2, 0.5)), scene)
+}
+
+fn mapped(sequence: &Arc<Sequence>, frame: u64) -> (FramePlan, ErrorMap) {
+    let planner = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner");
+    let plan = planner.plan(frame).expect("a plan");
+    let map = planner.error_map(&plan).expect("a map");
+    (plan, map)
+}
+
+#[test]
+fn the_largest_of_all_places_is_what_the_plan_says() {
+    let mut kinds = [0; 3];
+    let mut cases: Vec<(&str, Scenario, Scene)> = Vec::new();
+    for tolerance_px in [0.05, 1e-3] {
+        for (name, scene) in [("plane", pattern(60_000.0)), ("hills", hills()), ("city", city(5))] {
+            let mut scenario = camera();
+            scenario.quality.max_error_px = tolerance_px;
+            // What is shared is drawn for the strictest of all.
+            scenario.quality.frames_per_ideal = 1;
+            cases.push((name, scenario, scene));
+        }
+    }
+    for solver in [Solver::Linear, Solver::Rk2] {
+        let mut scenario = camera();
+        scenario.quality.solver = Auto::Value(solver);
+        cases.push(("a solver by name", scenario, hills()));
+    }
+    let mut several = camera();
+    several.quality.key_frames = Auto::Value(3);
+    cases.push(("several ideal frames", several, city(5)));
+    let mut still = camera();
+    still.camera.shutter.exposure_ms = 0.0;
+    cases.push(("no exposure", still, hills()));
+    for (name, scenario, scene) in cases {
+        let (plan, map) = mapped(&flown(scenario, scene), 3);
+        let (largest_px, total_px) = (map.largest_px(), plan.predicted.total_px);
+        let off = (largest_px - total_px).abs() / total_px;
+        eprintln!("{name}: {:?}, {} keys, {largest_px:.6e} px of {total_px:.6e}", plan.temporal, plan.keys.len());
+        assert!(off < 1e-9, "{name}: {largest_px} px, the plan {total_px}");
+        assert!(map.places.len() >= plan.predicted.probes as usize && map.known().count() > 100, "{name}: {}", map.known().count());
+        kinds[match plan.temporal {
+            TemporalStage::Linear | TemporalStage::Rk2 => 0,
+            _ if plan.keys.len() > 1 => 1,
+            _ => 2,
+        }] += 1;
+    }
+    assert!(kinds.iter().all(|count| *count > 0), "each way was tried: {kinds:?}");
+}
+
+#[test]
+fn frames_of_one_ideal_frame_have_their_own_maps() {
+    let mut scenario = camera();
+    (scenario.camera.size_px, scenario.camera.focal_px) = ([160, 120], [130.0, 130.0]);
+    scenario.camera.lens.coefficients = vec![-0.2, 0.05, 0.001, -0.002];
+    scenario.camera.mount.angles_deg = [0.0, -60.0, 0.0];
+    scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
+    scenario.quality.frames_per_ideal = 8;
+    let sequence = sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, -1.0), DVec3::new(0.1, -0.05, 0.2)), pattern(800.0));
+    let shared: Vec<_> = (0..12).map(|frame| mapped(&sequence, frame)).filter(|(plan, _)| plan.shared_by.is_some()).collect();
+    assert!(!shared.is_empty(), "no frame shares");
+    for (plan, map) in shared {
+        let (largest_px, total_px) = (map.largest_px(), plan.predicted.total_px);
+        assert!((largest_px - total_px).abs() < 1e-9 * total_px, "frame {}: {largest_px} px, the plan {total_px}", plan.frame);
+    }
+}
+
+/// By exact rays at random pixels, away from silhouettes as the map itself knows them.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn pixels_are_off_by_no_more_than_the_places_around_them_say() {
+    let engine = engine();
+    for (name, scene) in [("plane", pattern(60_000.0)), ("hills", hills()), ("city", city(5))] {
+        let mut scenario = camera();
+        scenario.camera.shutter.exposure_ms = 0.0;
+        scenario.quality.frames_per_ideal = 1;
+        let sequence = flown(scenario, scene);
+        let done = render(&engine, &sequence, &[Channel::Color, Channel::Coords], 0);
+        let planner = Planner::new(sequence.clone(), &[Channel::Color, Channel::Coords], 16_384).expect("a planner");
+        let map = planner.error_map(&done.plan).expect("a map");
+        let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
+        let view = oracle.view(0);
+        let key = KeyFrame { pose: done.plan.key_pose, ideal: done.plan.ideal };
+        let coords = done.frame.coords.as_ref().expect("asked for");
+        let (mut within, mut all, mut apart, mut least_px, mut most_px) = (0, 0, 0, f64::INFINITY, 0.0_f64);
+        for i in 0..PIXELS {
+            let [x, y, ..] = pcg4d([i, 3, 1, 4]);
+            let pixel = [x % 320, y % 240];
+            let Some(look) = view.look(pixel, DVec2::ZERO, 0.0) else { continue };
+            let Some(around_px) = map.around_px(pixel) else {
+                apart += 1;
+                continue;
+            };
+            let [.., at_x, at_y] = coords[(pixel[1] * 320 + pixel[0]) as usize][..4] else { panic!("four numbers") };
+            let off_px = DVec2::new(f64::from(at_x), f64::from(at_y)).distance(key.source_px(&look));
+            // Single precision of coordinates of some hundred pixels says nothing below this.
+            within += u32::from(off_px <= around_px.max(3e-5));
+            all += 1;
+            (least_px, most_px) = (least_px.min(around_px), most_px.max(around_px));
+        }
+        eprintln!(
+            "{name}: {:.2} % of {all} within; places {least_px:.2e} to {most_px:.2e} px, {apart} apart",
+            100.0 * f64::from(within) / f64::from(all)
+        );
+        assert!(all > PIXELS / 2, "{name}: {all}");
+        assert!(f64::from(within) >= 0.98 * f64::from(all), "{name}: {within} of {all}");
+    }
+}
