@@ -33,6 +33,8 @@ use crate::{
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
 const SAFETY: f64 = 1.3;
+/// Spread of what a probe finds at borders, squared, of its mean: as many probes as found any are as sure of it as their number allows.
+const UNSURE: f64 = 1.5;
 /// Times what is found at borders, squared, at most, that is taken to lie between those.
 const MOST_FINER: f64 = 2.0;
 /// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
@@ -85,7 +87,7 @@ pub(super) struct Search<'a> {
 /// What is seen around a probe.
 pub(super) struct Around {
     contour: Option<Contour>,
-    /// Side of the pixel and path over the exposure, pixels of the camera's focal length; where there is a border.
+    /// Side of the pixel and how far the path over the exposure goes, pixels of the camera's focal length; where there is a border.
     sides_px: Option<[f64; 2]>,
     /// What is found pixel by pixel, where models may be thinner than the places of that look.
     crossed: Crossed,
@@ -158,16 +160,17 @@ impl Outlook {
         };
         let (of_probes, of_lines) = (SAFETY * SAFETY * share * mean(&Contour::steps), over_all(&|crossed| crossed.steps));
         let finer = finer(around);
+        let unsure = 1.0 + UNSURE / (around.iter().filter(|around| around.sides_px.is_some()).count().max(1) as f64).sqrt();
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
             strips: STRIPS * contrast2 * holes.narrow_share + share * mean(&Contour::strip),
-            steps: of_probes.max(finer * of_lines),
+            steps: unsure * of_probes.max(finer * of_lines),
             steps_apart: of_probes.max(of_lines / finer),
-            flush: finer * over_all(&|crossed| crossed.flush),
-            feet: finer * over_all(&|crossed| crossed.feet),
-            once_a_pixel: (finer * finer).recip(),
+            flush: unsure * finer * over_all(&|crossed| crossed.flush),
+            feet: unsure * finer * over_all(&|crossed| crossed.feet),
+            once_a_pixel: (unsure * finer * finer).recip(),
             places: places(around),
         }
     }
@@ -306,7 +309,8 @@ impl Search<'_> {
         let focal_px = self.reach.camera.focal_px;
         let sides_px = has_border.then(|| {
             let path = path_px(self.path, mid_s, self.shutter.exposure_s(), probe.uv, inverse_depth[4], focal_px);
-            [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.1]
+            // To and fro spreads a border no farther than it goes.
+            [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.0.length()]
         });
         let contour = sides_px.filter(|_| !across.is_empty()).map(|[_, path_px]| Contour {
             strip_px: across.iter().map(strip_px).fold(0.0, f64::max),
