@@ -34,7 +34,7 @@ use crate::{
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
 const SAFETY: f64 = 1.3;
 /// Spread of what a probe finds at borders, squared, of its mean: as many probes as found any are as sure of it as their number allows.
-const UNSURE: f64 = 1.5;
+const UNSURE: f64 = 0.7;
 /// Times what is found at borders, squared, at most, that is taken to lie between those.
 const MOST_FINER: f64 = 2.0;
 /// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.

@@ -27,8 +27,9 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 const DIRECTIONS: u32 = 32;
 /// Where the source lies between ideal pixels: anywhere alike.
 const BESIDE_PX: [DVec2; 2] = [DVec2::new(0.13, 0.38), DVec2::new(0.62, 0.87)];
-/// Steps of a doubling that widths and paths are told apart by.
+/// Steps of a doubling that widths are told apart by, and paths and samples.
 const STEPS: f64 = 8.0;
+const STEPS_OF_PATH: f64 = 4.0;
 /// Direction of the path: borders run every way, so that it matters little.
 const ALONG: f64 = 0.5;
 
@@ -49,18 +50,24 @@ static KNOWN: LazyLock<RwLock<HashMap<Key, f64>>> = LazyLock::new(RwLock::defaul
 
 /// Squared error that a border leaves in the picture: mean over pixels, for a contrast of 1 and as many pixel sides of border as pixels.
 pub(super) fn left(reading: &Reading) -> f64 {
-    let step = |px: f64| (STEPS * px.max(1e-3).log2()).round() as i32;
-    let key = (step(reading.width_px), reading.taps, reading.exposure.map(|(path_px, samples)| (step(path_px + 1.0), samples)));
+    let step = |steps: f64, px: f64| (steps * px.max(1e-3).log2()).round() as i32;
+    let of_path = |(path_px, samples): (f64, u32)| (step(STEPS_OF_PATH, path_px + 1.0), fewer(samples));
+    let key = (step(STEPS, reading.width_px), reading.taps, reading.exposure.map(of_path));
     if let Some(known) = KNOWN.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
         return *known;
     }
     // Of the step itself: what is known does not depend on who asked first.
-    let px = |step: i32| (f64::from(step) / STEPS).exp2();
-    let exposure = key.2.map(|(path, samples)| (px(path) - 1.0, samples));
-    let found = worked_out(&Reading { width_px: px(key.0), taps: key.1, exposure });
+    let px = |steps: f64, step: i32| (f64::from(step) / steps).exp2();
+    let exposure = key.2.map(|(path, samples)| (px(STEPS_OF_PATH, path) - 1.0, samples));
+    let found = worked_out(&Reading { width_px: px(STEPS, key.0), taps: key.1, exposure });
     // What is kept is replaced whole.
     KNOWN.write().unwrap_or_else(PoisonError::into_inner).insert(key, found);
     found
+}
+
+/// Of many samples a round number of no more.
+fn fewer(samples: u32) -> u32 {
+    if samples <= 8 { samples } else { ((STEPS_OF_PATH * f64::from(samples).log2() + 1e-9).floor() / STEPS_OF_PATH).exp2() as u32 }
 }
 
 fn worked_out(&Reading { width_px, taps, exposure }: &Reading) -> f64 {
@@ -147,5 +154,12 @@ mod tests {
     fn what_is_known_is_what_was_worked_out() {
         let reading = Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: Some((7.0, 8)) };
         assert_eq!([left(&reading), left(&reading)], [worked_out(&reading); 2]);
+        // What lies between the steps is as far off as these are apart, and not more sure of itself for samples that are not counted.
+        for (width_px, path_px, samples) in [(2.07, 6.2, 9), (1.03, 8.9, 31), (2.9, 2.3, 13)] {
+            let between = Reading { width_px, exposure: Some((path_px, samples)), ..reading };
+            let off = (left(&between) / worked_out(&between)).sqrt();
+            assert!((0.93..1.15).contains(&off), "{between:?}: {off:.3}");
+        }
+        assert!((1..400).all(|samples| fewer(samples) <= samples && 5 * fewer(samples) >= 4 * samples - 1));
     }
 }
