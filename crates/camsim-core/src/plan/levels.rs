@@ -186,8 +186,7 @@ impl Prospect<'_> {
             let Some((&last, fewer)) = choices.split_last() else { continue };
             let most = way(sampling, last);
             let Some(beside_most_dn) = beside_dn(&most.0, most.1) else { continue };
-            let is_far = beside_most_dn > FAR * max_error_dn;
-            let rough_dn = if is_far { beside_most_dn } else { roughly_dn(most).hypot(beside_most_dn) };
+            let rough_dn = roughly_dn(most).hypot(beside_most_dn);
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
             let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
