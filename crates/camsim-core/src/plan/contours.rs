@@ -14,13 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    BlurStage, Holes, LensReach,
-    borders::Crossed,
-    edges::MOST_FINE,
-    levels::{Sampling, sample_count},
-    probes::Probe,
-    prospect::path_px,
-    stairs::{self, Reading},
+    BlurStage, Holes, LensReach, borders::Crossed, edges::MOST_FINE, levels::Sampling, probes::Probe, prospect::path_px, stairs::Places,
     surfaces::Surfaces,
 };
 use crate::{
@@ -28,7 +22,6 @@ use crate::{
     pose::CameraPose,
     shutter::Shutter,
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
-    temporal::Footprint,
 };
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
@@ -47,8 +40,6 @@ const RAYS_LEAVE: f64 = 0.42;
 const SAFETY_WITH_RAYS: f64 = 1.2;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
 const LEAST_LEFT: f64 = 0.1;
-/// Steps of a doubling that widths and paths of pixels with borders are told apart by.
-const STEPS_ALIKE: f64 = 3.0;
 /// Price of marks, samples and rays for a picture that is all silhouettes, bilinear reads of an output pixel: from frame times on llvmpipe. So much more
 /// for ideal frames of more pixels, and by fine pixels along a side of each.
 const RAYS_PRICE: f64 = 1900.0;
@@ -113,16 +104,7 @@ pub(super) struct Outlook {
     feet: f64,
     /// Part of these two that a look once a pixel finds.
     once_a_pixel: f64,
-    places: Vec<Place>,
-}
-
-/// Pixels with borders that are alike.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    /// Part of all that have borders, by squared contrast.
-    part: f64,
-    /// Side of the pixel and path over the exposure, pixels of the camera's focal length.
-    sides_px: [f64; 2],
+    places: Places,
 }
 
 /// One probe near a silhouette.
@@ -131,6 +113,14 @@ struct Contour {
     path_px: f64,
     /// Parallax between the two surfaces, across the border.
     strip_px: f64,
+}
+
+impl Around {
+    /// How much there is of borders, and the side of the pixel and its path.
+    fn place(&self) -> Option<(f64, [f64; 2])> {
+        let Crossed { steps, flush, feet, .. } = self.crossed;
+        Some((self.contour.as_ref().map_or(0.0, Contour::steps).max(steps) + flush + feet, self.sides_px?))
+    }
 }
 
 impl Contour {
@@ -171,19 +161,8 @@ impl Outlook {
             flush: unsure * finer * over_all(&|crossed| crossed.flush),
             feet: unsure * finer * over_all(&|crossed| crossed.feet),
             once_a_pixel: (unsure * finer * finer).recip(),
-            places: places(around),
+            places: Places::new(around.iter().filter_map(Around::place)),
         }
-    }
-
-    /// What reads of an ideal frame leave of borders, for a squared contrast of 1 times their length in each pixel.
-    fn left(&self, sampling: &Sampling, blur: Option<BlurStage>) -> f64 {
-        let of = |place: &Place| {
-            let [width_px, path_px] = place.sides_px.map(|px| sampling.scale * px);
-            let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, sampling.taps);
-            let exposure = blur.map(|blur| (path_px, sample_count(&blur, path_px, &area)));
-            place.part * stairs::left(&Reading { width_px, taps: sampling.taps, exposure })
-        };
-        self.places.iter().map(of).sum()
     }
 
     /// Of giving pixels at silhouettes rays of their own, bilinear reads of an output pixel, with so many ideal pixels for each of the
@@ -195,31 +174,21 @@ impl Outlook {
 
     /// Left as they are.
     pub fn plain(&self, sampling: &Sampling, blur: Option<BlurStage>) -> Contours {
-        self.of((self.steps + self.flush + self.feet) * self.left(sampling, blur) + self.strips)
+        self.of((self.steps + self.flush + self.feet) * self.places.left(sampling, blur) + self.strips)
     }
 
-    /// Not more than what they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's.
+    /// About the least that they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's.
     pub fn plain_at_best(&self, scale: f64) -> Contours {
-        self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.along_whole_pixels(scale) + self.strips)
+        self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
     }
 
     /// With rays of their own: a border is known to a part of a fine pixel.
     pub fn with_rays(&self, sampling: &Sampling, blur: Option<BlurStage>, fine: u32) -> Contours {
-        let as_they_are = self.left(sampling, blur);
-        let through_samples = RAYS_LEAVE * self.along_whole_pixels(sampling.scale) / f64::from(fine * fine);
+        let as_they_are = self.places.left(sampling, blur);
+        let through_samples = RAYS_LEAVE * self.places.along_whole_pixels(sampling.scale) / f64::from(fine * fine);
         let of_feet = if fine > 1 { through_samples } else { as_they_are };
         let touching = self.once_a_pixel * (as_they_are * self.flush + of_feet * self.feet);
         self.of((SAFETY_WITH_RAYS / SAFETY).powi(2) * (through_samples * self.steps_apart + touching))
-    }
-
-    /// Squared error of borders along whole pixels of an ideal frame, as [`Outlook::left`] has it for what reads it.
-    ///
-    /// Where the border truly is within such a pixel is any place alike, so that one pixel of each line across has 1/12 of the squared
-    /// contrast. The path over the exposure spreads that over its length, as many times less of the contrast in as many times more pixels;
-    /// half of that, since many paths run along the border.
-    fn along_whole_pixels(&self, scale: f64) -> f64 {
-        let of = |place: &Place| place.part / (12.0 * scale * scale * (1.0 + place.sides_px[1]).sqrt());
-        self.places.iter().map(of).sum()
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -236,22 +205,6 @@ fn finer(around: &[Around]) -> f64 {
     let of = |Crossed { steps, flush, feet, once_a_pixel, .. }: &Crossed| [steps + flush + feet, *once_a_pixel];
     let [all, once] = around.iter().map(|around| of(&around.crossed)).fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
     if once > 0.0 { (all / once).clamp(1.0, MOST_FINER) } else { 1.0 }
-}
-
-/// Pixels with borders, those that are alike together.
-fn places(around: &[Around]) -> Vec<Place> {
-    let alike = |sides_px: [f64; 2]| sides_px.map(|px| (STEPS_ALIKE * (1.0 + px).log2()).round() as i64);
-    let mut found: Vec<([i64; 2], Place)> = Vec::new();
-    for around in around {
-        let Around { contour, crossed: Crossed { steps, flush, feet, .. }, sides_px: Some(sides_px), .. } = around else { continue };
-        let part = contour.as_ref().map_or(0.0, Contour::steps).max(*steps) + flush + feet;
-        match found.iter_mut().find(|(key, _)| *key == alike(*sides_px)) {
-            Some((_, place)) => place.part += part,
-            None => found.push((alike(*sides_px), Place { part, sides_px: *sides_px })),
-        }
-    }
-    let all: f64 = found.iter().map(|(_, place)| place.part).sum();
-    found.into_iter().map(|(_, place)| Place { part: place.part / all.max(1e-30), ..place }).collect()
 }
 
 impl Contours {
@@ -332,7 +285,7 @@ mod tests {
     use super::*;
     use crate::{
         camera::CameraModel,
-        plan::{SurfaceReads, exposure::ExposurePath},
+        plan::{SurfaceReads, exposure::ExposurePath, stairs},
         pose::BodyState,
         scenario::{LensModel, MountSpec, ShutterSpec},
         scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
@@ -437,14 +390,14 @@ mod tests {
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.steps, 0.0);
         let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2)].map(|of| of.error_dn);
-        let left = stairs::left(&Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
+        let left = stairs::left(&stairs::Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
         let rays_alike = rays * SAFETY / SAFETY_WITH_RAYS / found.once_a_pixel.sqrt();
         assert!((plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
     }
 
     #[test]
     fn finer_samples_find_the_feet_of_walls() {
-        let places = vec![Place { part: 1.0, sides_px: [1.0, 0.0] }];
+        let places = Places::new([(1.0, [1.0, 0.0])].into_iter());
         let feet = Outlook {
             share: 0.5,
             contrast_dn: 100.0,
@@ -490,8 +443,6 @@ mod tests {
         let [coarse, fine] = [1.0, 2.0].map(|scale| still.plain(&spline(scale), None).at_dn);
         let strips = still.of(still.strips).at_dn;
         assert!(fine < 0.6 * coarse && fine > strips && strips > 0.0, "the strips stay: {fine} {coarse} {strips}");
-        let path_px = outlook(20.0, 1.0, Holes::default()).places[0].sides_px[1];
-        assert!(path_px > 1.0, "{path_px}");
         let samples = ExposurePath::STRAIGHT.with_samples(2.0, 64);
         let blurred = outlook(20.0, 1.0, Holes::default()).plain(&spline(1.0), Some(samples));
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);

@@ -15,7 +15,11 @@ use std::{
 
 use glam::DVec2;
 
-use super::transfer::{Path, read_wave, sinc};
+use super::{
+    BlurStage,
+    levels::{Sampling, sample_count},
+    transfer::{Path, read_wave, sinc},
+};
 use crate::temporal::{Footprint, TapStage};
 
 /// Frequencies that count, cycles an ideal pixel.
@@ -43,9 +47,62 @@ pub(super) struct Reading {
     pub exposure: Option<(f64, u32)>,
 }
 
+/// Steps of a doubling that widths and paths of pixels with borders are told apart by.
+const STEPS_ALIKE: f64 = 3.0;
+
+/// Where the borders of a picture are.
+#[derive(Clone, Debug)]
+pub(super) struct Places(Vec<Place>);
+
+/// Pixels with borders that are alike.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    /// Part of all that have borders, by squared contrast.
+    part: f64,
+    /// Side of the pixel and path over the exposure, pixels of the camera's focal length.
+    sides_px: [f64; 2],
+}
+
+impl Places {
+    /// Of how much there is of borders, by squared contrast, where pixels and paths have these sides: those that are alike together.
+    pub fn new(borders: impl Iterator<Item = (f64, [f64; 2])>) -> Self {
+        let alike = |sides_px: [f64; 2]| sides_px.map(|px| (STEPS_ALIKE * (1.0 + px).log2()).round() as i64);
+        let mut found: Vec<([i64; 2], Place)> = Vec::new();
+        for (part, sides_px) in borders {
+            match found.iter_mut().find(|(key, _)| *key == alike(sides_px)) {
+                Some((_, place)) => place.part += part,
+                None => found.push((alike(sides_px), Place { part, sides_px })),
+            }
+        }
+        let all: f64 = found.iter().map(|(_, place)| place.part).sum();
+        Self(found.into_iter().map(|(_, place)| Place { part: place.part / all.max(1e-30), ..place }).collect())
+    }
+
+    /// What reads of an ideal frame leave of borders, for a squared contrast of 1 times their length in each pixel.
+    pub fn left(&self, sampling: &Sampling, blur: Option<BlurStage>) -> f64 {
+        let of = |place: &Place| {
+            let [width_px, path_px] = place.sides_px.map(|px| sampling.scale * px);
+            let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, sampling.taps);
+            let exposure = blur.map(|blur| (path_px, sample_count(&blur, path_px, &area)));
+            place.part * left(&Reading { width_px, taps: sampling.taps, exposure })
+        };
+        self.0.iter().map(of).sum()
+    }
+
+    /// The same where each output pixel has what one whole pixel of an ideal frame shows.
+    ///
+    /// Where the border truly is within such a pixel is any place alike, so that one pixel of each line across has 1/12 of the squared
+    /// contrast. The path over the exposure spreads that over its length, as many times less of the contrast in as many times more pixels;
+    /// half of that, since many paths run along the border.
+    pub fn along_whole_pixels(&self, scale: f64) -> f64 {
+        let of = |place: &Place| place.part / (12.0 * scale * scale * (1.0 + place.sides_px[1]).sqrt());
+        self.0.iter().map(of).sum()
+    }
+}
+
 type Key = (i32, TapStage, Option<(i32, u32)>);
 
-/// What has been worked out: a few hundred ways for all frames of a scene.
+/// What has been worked out: the frames of a scene share most of it.
 static KNOWN: LazyLock<RwLock<HashMap<Key, f64>>> = LazyLock::new(RwLock::default);
 
 /// Squared error that a border leaves in the picture: mean over pixels, for a contrast of 1 and as many pixel sides of border as pixels.
