@@ -1,4 +1,4 @@
-//! The built-in flight and its variants, shared by both benchmarks.
+//! The built-in flight and its variants, shared by the benchmarks.
 
 #![allow(dead_code, reason = "each benchmark uses its part")]
 
@@ -18,6 +18,7 @@ use camsim::{
 };
 
 pub mod ground;
+pub mod rounds;
 
 /// Whatever may go wrong: a benchmark stops and says so.
 pub type Outcome<T> = Result<T, Box<dyn std::error::Error>>;

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use camsim_gpu::engine::FrameTimes;
+use camsim_lab::timing::peak_memory_mb;
 
 use crate::progress::waiting;
 
@@ -70,6 +71,9 @@ impl TimesTable {
         text += "ms before the first frame\n";
         for (name, time) in &self.start {
             text += &format!("  {name:<22}{:>10.2}\n", time.as_secs_f64() * 1e3);
+        }
+        if let Some(mb) = peak_memory_mb() {
+            text += &format!("memory: {mb:.0} MB at most\n");
         }
         text
     }

@@ -1,4 +1,4 @@
-//! Clock and processor time, and what is said about a set of such times.
+//! Clock, processor time and memory, and what is said about a set of such times.
 
 use std::time::Duration;
 
@@ -19,6 +19,14 @@ pub fn processor_ms() -> Option<f64> {
         sum_ns += line.split_whitespace().next()?.parse::<f64>().ok()?;
     }
     Some(1e-6 * sum_ns)
+}
+
+/// The most memory that this program has held at once, MB (`/proc/self/status`, `VmHWM`). `None` where there is no such file.
+#[must_use]
+pub fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.split_whitespace().next()?;
+    Some(1.024e-3 * kib.parse::<f64>().ok()?)
 }
 
 /// The value below which `part` of the values lie, 0..=1, linear between neighbours; NaN without values.
@@ -48,6 +56,16 @@ mod tests {
         assert_eq!(quartiles(&[1.0, 2.0]), [1.25, 1.5, 1.75]);
         assert_eq!(quantile(&[7.0], 0.99), 7.0);
         assert!(quantile(&[], 0.5).is_nan());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn memory_once_held_stays_in_the_peak() {
+        let before = peak_memory_mb().expect("status");
+        let held = std::hint::black_box(vec![1_u8; 256 << 20]);
+        drop(held);
+        let peak = peak_memory_mb().expect("status");
+        assert!(peak > 200.0 && peak < before + 4096.0, "{before} {peak}");
     }
 
     #[test]

@@ -25,8 +25,8 @@ use crate::scenario::{Auto, Preset, Silhouettes};
 const WORTH: f64 = 0.1;
 /// Largest ideal frame for several, in pixels of one for a single frame.
 const MOST_AREA: f64 = 4.0;
-/// Parts of `quality.max_error_dn` that the first frame is sampled for, so that the others keep all of it.
-const SHARES: [f64; 2] = [1.0, 0.85];
+/// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it.
+const SHARES: [f64; 3] = [1.0, 1.0, 0.85];
 /// From so many frames on the halves of a group are tried each for itself.
 const FAR: usize = 8;
 /// Groups that are remembered: frames are asked for in order, by a few threads.
@@ -171,28 +171,45 @@ impl Planner {
     /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
     fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let mut common = self.common(frames.clone(), own)?;
-        let last_frame = frames.end - 1;
-        let is_worth_it = |plan: &FramePlan| plan.price < (1.0 - WORTH) * own.price;
+        let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price * count as f64;
+        // All are sampled as the first needs it; if that is too coarse for another, as that one does.
+        let mut asked = frames.start;
         for share_of_dn in SHARES {
             (common.share_of_dn, common.given) = (share_of_dn, None);
-            // The outermost first: what they need is enough for the others, and where they fail nothing else is tried.
-            let first = self.plan_shared(frames.start, &common).filter(|plan| keeps_px(plan, own) && is_worth_it(plan))?;
-            common.given = Some(Sampling::of(&first));
-            let common = &common;
-            let last = self.plan_shared(last_frame, common).filter(|plan| keeps_px(plan, own))?;
-            if !keeps_dn(&first, own) || !keeps_dn(&last, own) {
-                continue;
+            let plan = self.plan_shared(asked, &common).filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price, 1))?;
+            if !keeps_dn(&plan, own) {
+                return None;
             }
-            let plan = |frame: u64| self.plan_shared(frame, common).filter(|plan| keeps_px(plan, own) && keeps_dn(plan, own));
-            let between: Option<Vec<FramePlan>> = (frames.start + 1..last_frame).into_par_iter().map(plan).collect();
-            let Some(between) = between else { continue };
-            let plans: Vec<FramePlan> = [vec![first], between, vec![last]].concat();
-            let price: f64 = plans.iter().map(|plan| plan.price).sum();
-            if price < (1.0 - WORTH) * own.price * plans.len() as f64 {
-                return Some(together(plans));
+            common.given = Some(Sampling::of(&plan));
+            let plans = self.plan_others(frames.clone(), plan, &common, own)?;
+            let coarsest = plans
+                .iter()
+                .filter(|plan| !keeps_dn(plan, own))
+                .max_by(|a, b| a.predicted.picture_dn().total_cmp(&b.predicted.picture_dn()));
+            match coarsest {
+                Some(plan) => asked = plan.frame,
+                None => return is_worth_it(plans.iter().map(|plan| plan.price).sum(), common.count()).then(|| together(plans)),
             }
         }
         None
+    }
+
+    /// `planned` and the others of `frames`, in order, as far as it takes to tell which of them are sampled too coarsely: the outermost are looked at first,
+    /// what does for them mostly does for those between. `None` where one does not keep `quality.max_error_px`.
+    fn plan_others(&self, frames: Range<u64>, planned: FramePlan, common: &Common, own: &FramePlan) -> Option<Vec<FramePlan>> {
+        let plan = |frame: u64| self.plan_shared(frame, common).filter(|plan| keeps_px(plan, own));
+        let done = planned.frame;
+        let mut plans = vec![planned];
+        for outermost in [frames.start, frames.end - 1].into_iter().filter(|&frame| frame != done) {
+            plans.push(plan(outermost)?);
+            if plans.iter().any(|plan| !keeps_dn(plan, own)) {
+                return Some(plans);
+            }
+        }
+        let between: Vec<u64> = (frames.start + 1..frames.end - 1).filter(|&frame| frame != done).collect();
+        plans.extend(between.into_par_iter().map(plan).collect::<Option<Vec<_>>>()?);
+        plans.sort_by_key(|plan| plan.frame);
+        Some(plans)
     }
 
     /// The plan of a frame from a common ideal frame; `None` where silhouettes would cost too much, and for a fault.

@@ -1,0 +1,275 @@
+//! What a frame of `benches/all_effects.toml` costs by size, by length of blur, by effect and by file format, each table with the paper's
+//! preset of the same frames in the same rounds.
+//!
+//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `passes`,
+//! `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+
+#![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
+
+use std::{convert::Infallible, path::PathBuf, process::Command, sync::Arc, time::Duration};
+
+use camsim::{
+    core::{scenario::Channel, sequence::Sequence},
+    gpu::{AdapterChoice, Engine},
+    io::{load::load_sequence, scenario_file::read_scenario},
+    lab::timing::{peak_memory_mb, quartiles},
+};
+
+mod flight;
+
+use flight::{
+    Outcome, Without,
+    rounds::{Effort, Variant, measure, ratio, say_rounds, times},
+};
+
+const EFFORT: Effort = Effort { burst: 8, rounds: 25, budget: Duration::from_secs(90) };
+/// Large frames take seconds.
+const EFFORT_LARGE: Effort = Effort { burst: 4, rounds: 9, budget: Duration::from_secs(120) };
+/// The paper's preset, as it is called in the tables.
+const PRESET: &str = "the paper's preset";
+/// Of files: programs run one after the other, so many times.
+const FILE_ROUNDS: usize = 5;
+const FILE_FRAMES: &str = "32..64";
+
+fn main() -> Outcome<()> {
+    // Cargo passes `--bench`; anything else that runs the program (`cargo test --benches`) only wants to know whether it works.
+    let (measuring, wanted): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|argument| argument == "--bench");
+    let is_measuring = !measuring.is_empty();
+    let engine = Engine::new(AdapterChoice::Best)?;
+    println!("adapter   {}", engine.gpu().adapter);
+    println!("frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table");
+    for (name, table) in [("size", size as fn(&Engine, bool) -> Outcome<()>), ("blur", blur), ("effects", effects), ("passes", passes)] {
+        if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
+            table(&engine, is_measuring)?;
+        }
+    }
+    drop(engine);
+    if wanted.is_empty() || wanted.iter().any(|wanted| wanted == "files") {
+        files(is_measuring)?;
+    }
+    Ok(())
+}
+
+/// Frames of several sizes, the path over the exposure the same in pixels.
+fn size(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let sizes: &[[u32; 2]] = if is_measuring { &[[640, 480], [320, 240], [1280, 960], [2560, 1920], [3840, 2160]] } else { &[[320, 240]] };
+    let mut variants = Vec::new();
+    for &[width, height] in sizes {
+        let k = f64::from(width) / 640.0;
+        // 3840x2160 is a strip across the middle of 3840x2880.
+        let principal_y = 226.2 * k - 0.5 * (480.0 * k - f64::from(height));
+        let sequence = changed(&[
+            ("camera.size_px", format!("[{width}, {height}]")),
+            ("camera.focal_px", format!("[{0}, {0}]", 307.6 * k)),
+            ("camera.principal_point_px", format!("[{}, {principal_y}]", 305.1 * k)),
+            ("camera.shutter.exposure_ms", (24.0 / k).to_string()),
+        ])?;
+        variants.push(Variant::open(format!("{width} x {height}"), engine, sequence, &[Channel::Color])?);
+    }
+    variants.push(Variant::open(PRESET, engine, preset()?, &[Channel::Color])?);
+    let effort = effort(EFFORT_LARGE, is_measuring);
+    measure(&mut variants, 96, effort)?;
+    println!("{}", say_rounds(&variants, effort));
+    println!("| frame | ms a frame | frames/s | processor ms a frame | processor ns a pixel | to the first, a pixel, in the same round |");
+    println!("|---|---|---|---|---|---|");
+    let pixels = |variant: &Variant<'_>| {
+        let [width, height] = variant.session.planner().sequence().scenario.camera.size_px;
+        f64::from(width) * f64::from(height)
+    };
+    for variant in &variants {
+        let [wall, rate, _, processor, _] = times(variant, &variants[0]);
+        let ns = 1e6 * quartiles(&variant.processor_ms)[1] / pixels(variant);
+        let to_first = ratio(&variant.processor_ms, &variants[0].processor_ms) * pixels(&variants[0]) / pixels(variant);
+        println!("| {} | {wall} | {rate} | {processor} | {ns:.0} | {to_first:.2} |", variant.name);
+    }
+    Ok(())
+}
+
+/// Exposures from none to a path of some 100 px.
+fn blur(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let exposures_ms: &[f64] = if is_measuring { &[24.0, 0.0, 2.4, 7.2, 72.0, 240.0] } else { &[24.0] };
+    let mut variants = Vec::new();
+    for exposure_ms in exposures_ms {
+        let sequence = changed(&[("camera.shutter.exposure_ms", exposure_ms.to_string())])?;
+        let path_px = median_path_px(engine, &sequence)?;
+        variants.push(Variant::open(format!("{exposure_ms} ms | {path_px:.1}"), engine, sequence, &[Channel::Color])?);
+    }
+    // The preset samples paths of any length as often as it is told.
+    for samples in [100, 10] {
+        let sequence = changed(&[("quality.preset", "\"paper\"".into()), ("quality.blur_samples", samples.to_string())])?;
+        variants.push(Variant::open(format!("24 ms, {PRESET}, {samples} samples | "), engine, sequence, &[Channel::Color])?);
+    }
+    let effort = effort(EFFORT, is_measuring);
+    measure(&mut variants, 96, effort)?;
+    println!("{}", say_rounds(&variants, effort));
+    print_against(&variants, "exposure | path of a pixel, median, px");
+    Ok(())
+}
+
+/// The full camera, and with each effect left out.
+fn effects(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let whole = changed(&[])?;
+    let mut variants = Vec::new();
+    for (name, without) in EFFECTS.into_iter().take(if is_measuring { EFFECTS.len() } else { 1 }) {
+        variants.push(Variant::open(name, engine, without.of(&whole)?, &[Channel::Color])?);
+    }
+    variants.push(Variant::open(PRESET, engine, preset()?, &[Channel::Color])?);
+    let effort = effort(EFFORT, is_measuring);
+    measure(&mut variants, 96, effort)?;
+    println!("{}", say_rounds(&variants, effort));
+    print_against(&variants, "variant");
+    Ok(())
+}
+
+const EFFECTS: [(&str, Without); 7] = [
+    ("all effects", Without::Nothing),
+    ("- vignette and noise", Without::Photometric),
+    ("- motion blur", Without::Blur),
+    ("- rolling shutter", Without::RollingShutter),
+    ("- blur and rolling shutter", Without::Time),
+    ("- lens", Without::Lens),
+    ("- all of these: a perfect camera", Without::Anything),
+];
+
+/// Where the device's time goes, by its own clock.
+fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let whole = changed(&[])?;
+    let kinds = [
+        ("all effects", whole.clone()),
+        ("a perfect camera", Without::Anything.of(&whole)?),
+        ("max_error_dn = 2", changed(&[("quality.max_error_dn", "2".into())])?),
+        (PRESET, preset()?),
+    ];
+    let mut columns: Vec<Vec<(String, Vec<f64>)>> = Vec::new();
+    for (_, sequence) in &kinds {
+        let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color])?;
+        if !session.time_passes() {
+            println!("\nthe adapter has no time stamps: no passes");
+            return Ok(());
+        }
+        let mut column: Vec<(String, Vec<f64>)> = Vec::new();
+        session.render::<Infallible>(32..if is_measuring { 64 } else { 33 }, &mut |finished| {
+            let times = &finished.times;
+            let host = [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: read", times.read_ms)];
+            let device = times.passes.iter().map(|pass| (format!("device: {}", pass.name), pass.ms));
+            for (name, ms) in host.map(|(name, ms)| (name.to_owned(), ms)).into_iter().chain(device) {
+                match column.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, all)) => all.push(ms),
+                    None => column.push((name, vec![ms])),
+                }
+            }
+            Ok(())
+        })?;
+        columns.push(column);
+    }
+    let mut names: Vec<&str> = columns.iter().flatten().map(|(name, _)| name.as_str()).collect();
+    let mut seen = Vec::new();
+    names.retain(|name| {
+        !seen.contains(name) && {
+            seen.push(*name);
+            true
+        }
+    });
+    println!("\nmedian ms where a frame has the pass, and in how many of the frames it is\n");
+    println!("| part | {} |", kinds.each_ref().map(|(name, _)| *name).join(" | "));
+    println!("|---{}|", "|---".repeat(kinds.len()));
+    for name in names {
+        let cells = columns.iter().map(|column| match column.iter().find(|(known, _)| known == name) {
+            Some((_, all)) => format!("{:.1}, {}", quartiles(all)[1], all.len()),
+            None => String::new(),
+        });
+        println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
+    }
+    Ok(())
+}
+
+/// The program itself, with and without files.
+fn files(is_measuring: bool) -> Outcome<()> {
+    let folder = tempfile::tempdir()?;
+    let kinds: [(&str, &[&str]); 6] = [
+        ("none", &["--format", "none"]),
+        ("EXR, uncompressed", &["--format", "exr", "--set", "output.exr_compression=none"]),
+        ("EXR, zip1 (default)", &["--format", "exr"]),
+        ("EXR, piz", &["--format", "exr", "--set", "output.exr_compression=piz"]),
+        ("PNG", &["--format", "png"]),
+        (PRESET, &["--format", "none", "--set", "quality.preset=paper"]),
+    ];
+    let mut rates = vec![Vec::new(); kinds.len()];
+    let mut peaks = vec![Vec::new(); kinds.len()];
+    for round in 0..if is_measuring { FILE_ROUNDS } else { 1 } {
+        for place in 0..kinds.len() {
+            let i = (place + round) % kinds.len();
+            let out = folder.path().join(i.to_string());
+            let run = Command::new(env!("CARGO_BIN_EXE_camsim"))
+                .args(["render".as_ref(), scenario_path().as_os_str()])
+                .args(kinds[i].1)
+                .args(["--frames", if is_measuring { FILE_FRAMES } else { "32" }, "--times", "-o"])
+                .arg(&out)
+                .output()?;
+            let said = String::from_utf8_lossy(&run.stdout).into_owned();
+            let number_before =
+                |mark: &str| said.split(mark).next().and_then(|before| before.split_whitespace().last()?.parse::<f64>().ok());
+            let rate = number_before(" frames/s").ok_or_else(|| format!("no rate in: {said}{}", String::from_utf8_lossy(&run.stderr)))?;
+            rates[i].push(rate);
+            peaks[i].extend(number_before(" MB at most"));
+            std::fs::remove_dir_all(&out)?;
+        }
+    }
+    println!("\nrounds    {} of frames {FILE_FRAMES}, one program after the other; medians, quartiles in brackets\n", rates[0].len());
+    println!("| files | frames/s | to none, in the same round | memory at most, MB |");
+    println!("|---|---|---|---|");
+    for ((name, _), (rate, peak)) in kinds.iter().zip(rates.iter().zip(&peaks)) {
+        let [low, median, high] = quartiles(rate);
+        println!("| {name} | {median:.1} ({low:.1} .. {high:.1}) | {:.2} | {:.0} |", ratio(rate, &rates[0]), quartiles(peak)[1]);
+    }
+    if let Some(mb) = peak_memory_mb() {
+        println!("\nmemory of this program, with the sessions of the tables above: {mb:.0} MB at most");
+    }
+    Ok(())
+}
+
+/// Times of all variants, and of each how many times as fast as the preset it is.
+fn print_against(variants: &[Variant<'_>], head: &str) {
+    println!("| {head} | ms a frame | frames/s | to the first | processor ms a frame | to the first | times the preset's rate |");
+    println!("|---{}|---|---|---|---|---|---|", "|---".repeat(head.matches('|').count()));
+    let preset = variants.iter().find(|variant| variant.name.contains(PRESET)).unwrap_or(&variants[0]);
+    for variant in variants {
+        let faster = ratio(&preset.ms, &variant.ms);
+        println!("| {} | {} | {faster:.2} |", variant.name, times(variant, &variants[0]).join(" | "));
+    }
+}
+
+fn effort(effort: Effort, is_measuring: bool) -> Effort {
+    if is_measuring { effort } else { Effort::TRY }
+}
+
+fn scenario_path() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("benches/all_effects.toml")
+}
+
+/// The scenario with some keys set.
+fn changed(sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
+    let sets: Vec<(String, String)> = sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    Ok(load_sequence(&read_scenario(&scenario_path(), &sets, None)?)?.sequence)
+}
+
+fn preset() -> Outcome<Arc<Sequence>> {
+    changed(&[("quality.preset", "\"paper\"".to_owned())])
+}
+
+/// From the exposure's begin to its end, in pixels of the camera: where two renderings say that the source is.
+fn median_path_px(engine: &Engine, sequence: &Arc<Sequence>) -> Outcome<f64> {
+    let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords])?;
+    let mut ends = Vec::new();
+    for phase in [-0.5, 0.5] {
+        session.set_coords_phase(phase);
+        session.render::<Infallible>([40], &mut |finished| {
+            ends.push((finished.frame.coords, finished.plan.ideal.focal_px.x));
+            Ok(())
+        })?;
+    }
+    let [(Some(begin), focal_px), (Some(end), _)] = &ends[..] else { return Err("coordinates were asked for".into()) };
+    let scale = focal_px / sequence.scenario.camera.focal_px[0];
+    let paths = begin.iter().zip(end).map(|(a, b)| f64::from((a[2] - b[2]).hypot(a[3] - b[3])) / scale);
+    Ok(quartiles(&paths.filter(|path| path.is_finite()).collect::<Vec<_>>())[1])
+}
