@@ -26,13 +26,13 @@ mod query;
 mod select;
 #[cfg(test)]
 mod tests;
+mod tree;
 
 use std::{fmt, sync::Arc};
 
 use glam::{DVec3, Vec3};
 
 pub use bounds::Aabb;
-use bounds::BlockTree;
 pub(in crate::scene) use bounds::inverse;
 pub use build::TerrainGrid;
 pub use detail::TerrainDetail;
@@ -43,6 +43,7 @@ pub(crate) use query::Frustum;
 pub use query::TerrainHit;
 pub(crate) use query::intersect_triangle;
 pub use select::{LodSelection, TerrainMesh, VERTEX_BITS};
+use tree::BlockTree;
 
 use super::Texture;
 

@@ -6,12 +6,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    Aabb, CHUNK_CELLS, Terrain, TerrainChunk, TerrainError, TerrainVertex,
-    bounds::{BLOCK_CELLS, BlockTree},
-    cell_triangles,
+    Aabb, CHUNK_CELLS, Terrain, TerrainChunk, TerrainError, TerrainVertex, cell_triangles,
     errors::{self, ChunkGrid, chunk_errors},
     lattice::NODE_CELLS,
     select::VERTEX_BITS,
+    tree::{BLOCK_CELLS, BlockTree},
 };
 use crate::scene::{Encoding, Texture};
 
@@ -152,7 +151,7 @@ impl Terrain {
             texture,
             quantum_m,
             bounds: Aabb::EMPTY,
-            tree: BlockTree::new([1, 1], vec![Aabb::EMPTY]),
+            tree: BlockTree::new([1, 1], &[Aabb::EMPTY]),
             border: Vec::new(),
         };
         for part in parts {
@@ -225,7 +224,7 @@ impl Terrain {
                 bounds
             })
             .collect();
-        BlockTree::new(size, boxes)
+        BlockTree::new(size, &boxes)
     }
 }
 

@@ -250,6 +250,6 @@ impl<'a> TerrainDetail<'a> {
         let at = [chunk % grid[0], chunk / grid[0]].map(|n| i64::from(n * per_chunk));
         let at = [at[0] + i64::from(column), at[1] + i64::from(row)];
         let bounds = self.terrain.tree.square(cells, at);
-        bounds.map_or(OUT_OF_SIGHT, |bounds| self.judge.tolerance(bounds, self.terrain.horizontal_m[size]))
+        bounds.map_or(OUT_OF_SIGHT, |bounds| self.judge.tolerance(&bounds, self.terrain.horizontal_m[size]))
     }
 }

@@ -458,7 +458,7 @@ fn the_search_for_chunks_finds_what_a_look_at_each_of_them_does() {
         let seen: Vec<u32> = (0..terrain.chunks.len() as u32)
             .filter(|&chunk| {
                 let at = [chunk % terrain.chunk_grid[0], chunk / terrain.chunk_grid[0]].map(i64::from);
-                frustum.may_see(terrain.tree.square(CHUNK_CELLS, at).unwrap())
+                frustum.may_see(&terrain.tree.square(CHUNK_CELLS, at).unwrap())
             })
             .collect();
         assert_eq!(mesh.chunks, seen);

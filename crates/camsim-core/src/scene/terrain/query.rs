@@ -3,9 +3,8 @@
 use glam::{DVec2, DVec3, Vec3};
 
 use super::{
-    Terrain,
-    bounds::{BLOCK_CELLS, Node, inverse},
-    cell_triangles,
+    Terrain, cell_triangles,
+    tree::{BLOCK_CELLS, Node},
 };
 use crate::pose::CameraPose;
 
@@ -28,32 +27,12 @@ impl Terrain {
     /// First point of the full surface along `origin + t direction`, 0 <= t <= `t_max`; from either side. The direction need not have unit
     /// length. Rays cannot slip through between triangles.
     pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
-        let inverse = inverse(direction_ned);
         let mut best: Option<TerrainHit> = None;
-        let mut limit = t_max;
-        let root = self.tree.root();
-        let mut stack: Vec<(f64, Node)> = Vec::with_capacity(64);
-        stack.extend(self.tree.bounds(root).enter(origin_ned_m, inverse, limit).map(|t| (t, root)));
-        while let Some((t_enter, node)) = stack.pop() {
-            if t_enter > limit {
-                continue;
-            }
-            if node.level == 0 {
-                if let Some(hit) = self.intersect_block(node.at, origin_ned_m, direction_ned, limit) {
-                    limit = hit.t;
-                    best = Some(hit);
-                }
-                continue;
-            }
-            let below = stack.len();
-            for child in self.tree.children(node) {
-                if let Some(t) = self.tree.bounds(child).enter(origin_ned_m, inverse, limit) {
-                    // Nearest last, so that it comes off first.
-                    let place = (below..stack.len()).find(|&i| stack[i].0 < t).unwrap_or(stack.len());
-                    stack.insert(place, (t, child));
-                }
-            }
-        }
+        self.tree.walk(origin_ned_m, direction_ned, t_max, &mut |block, limit| {
+            let hit = self.intersect_block(block, origin_ned_m, direction_ned, limit);
+            best = hit.or(best);
+            hit.map_or(limit, |hit| hit.t)
+        });
         best
     }
 
@@ -88,7 +67,7 @@ impl Terrain {
             let bounds = self.tree.bounds(node);
             let distance = bounds.distance_m(position_ned_m);
             // Written so that a NaN distance goes nowhere.
-            if distance < nearest && accept(bounds) {
+            if distance < nearest && accept(&bounds) {
                 if node.level == 0 {
                     nearest = distance;
                 } else {
