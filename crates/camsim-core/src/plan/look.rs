@@ -14,6 +14,7 @@ use crate::{
 };
 
 /// A frame before anything is chosen for it.
+#[derive(Clone)]
 pub(super) struct Look<'a> {
     pub planner: &'a Planner,
     pub frame: u64,
@@ -23,6 +24,8 @@ pub(super) struct Look<'a> {
     pub reach: Arc<LensReach>,
     /// The ideal frame that others are made from too, if this one is to be.
     pub common: Option<&'a sharing::Common>,
+    /// What is asked of the way in which it is sampled.
+    pub asked: sharing::Asked,
     /// The key instant, the camera's pose and twist then.
     pub key_s: f64,
     pub key_pose: CameraPose,
@@ -63,7 +66,8 @@ impl Planner {
         let key_twist =
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(&self.sequence.scenario.quality);
-        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, key_s, key_pose, key_twist, demanded })
+        let asked = sharing::Asked::default();
+        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, asked, key_s, key_pose, key_twist, demanded })
     }
 }
 

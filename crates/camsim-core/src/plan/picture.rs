@@ -32,7 +32,7 @@ impl Look<'_> {
             return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: 0.0 };
         }
         let quality = &self.planner.sequence.scenario.quality;
-        let max_error_dn = quality.max_error_dn * self.common.map_or(1.0, |common| common.share_of_dn);
+        let max_error_dn = quality.max_error_dn * self.asked.share_of_dn;
         let task = Task {
             quality,
             max_error_dn,
@@ -43,7 +43,7 @@ impl Look<'_> {
         };
         let Scenery { prospect, outlook, .. } = scenery;
         let layers_dn = scenery.layers_dn();
-        let given = self.common.and_then(|common| common.given);
+        let given = self.asked.given;
         let Some(outlook) = outlook else {
             let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));

@@ -9,7 +9,7 @@
 use std::{
     collections::VecDeque,
     ops::Range,
-    sync::{Arc, PoisonError},
+    sync::{Arc, OnceLock, PoisonError},
 };
 
 use rayon::prelude::*;
@@ -18,6 +18,7 @@ use super::{
     FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
     bounds::View,
     levels::{FINEST_SCALE, Sampling},
+    look::{Look, Scenery},
 };
 use crate::scenario::{Auto, Preset, Silhouettes};
 
@@ -38,10 +39,70 @@ pub(super) struct Common {
     frames: Range<u64>,
     pub key_s: f64,
     pub view: View,
-    /// Part of `quality.max_error_dn` that it is sampled for.
+}
+
+/// What is asked of the way in which a frame is sampled.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked {
+    /// Part of `quality.max_error_dn` that it is to keep.
     pub share_of_dn: f64,
-    /// How it and the frames are sampled; `None` as long as that is to be found.
+    /// The way itself; `None` as long as that is to be found.
     pub given: Option<Sampling>,
+}
+
+impl Default for Asked {
+    fn default() -> Self {
+        Self { share_of_dn: 1.0, given: None }
+    }
+}
+
+/// Frames that may be made from one ideal frame. What each of them sees is looked at once, however often it is planned.
+struct Candidates<'a> {
+    planner: &'a Planner,
+    common: &'a Common,
+    seen: Vec<OnceLock<Option<(Look<'a>, Scenery<'a>)>>>,
+}
+
+impl<'a> Candidates<'a> {
+    fn new(planner: &'a Planner, common: &'a Common) -> Self {
+        Self { planner, common, seen: common.frames.clone().map(|_| OnceLock::new()).collect() }
+    }
+
+    /// The plan of a frame from the common ideal frame; `None` where silhouettes would cost too much, and for a fault.
+    fn plan(&self, frame: u64, asked: Asked) -> Option<FramePlan> {
+        let place = self.seen.get((frame - self.common.frames.start) as usize)?;
+        let see = || {
+            let look = self.planner.look(frame, Some(self.common)).ok()?;
+            let scenery = look.scenery();
+            Some((look, scenery))
+        };
+        let (look, scenery) = place.get_or_init(see).as_ref()?;
+        let scale = asked.given.map_or(FINEST_SCALE, |sampling| sampling.scale);
+        if !scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale) {
+            return None;
+        }
+        self.planner.plan_of(&Look { asked, ..look.clone() }, scenery).ok()
+    }
+
+    /// `planned` and the others, sampled as it is and in order, as far as it takes to tell which of them are sampled too coarsely: the outermost are looked at first,
+    /// what does for them mostly does for those between. `None` where one does not keep `quality.max_error_px`.
+    fn plan_others(&self, planned: FramePlan, own: &FramePlan) -> Option<Vec<FramePlan>> {
+        let frames = &self.common.frames;
+        let asked = Asked { given: Some(Sampling::of(&planned)), ..Asked::default() };
+        let plan = |frame: u64| self.plan(frame, asked).filter(|plan| keeps_px(plan, own));
+        let done = planned.frame;
+        let mut plans = vec![planned];
+        for outermost in [frames.start, frames.end - 1].into_iter().filter(|&frame| frame != done) {
+            plans.push(plan(outermost)?);
+            if plans.iter().any(|plan| !keeps_dn(plan, own)) {
+                return Some(plans);
+            }
+        }
+        let between: Vec<u64> = (frames.start + 1..frames.end - 1).filter(|&frame| frame != done).collect();
+        plans.extend(between.into_par_iter().map(plan).collect::<Option<Vec<_>>>()?);
+        plans.sort_by_key(|plan| plan.frame);
+        Some(plans)
+    }
 }
 
 impl Common {
@@ -170,57 +231,28 @@ impl Planner {
 
     /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
     fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
-        let mut common = self.common(frames.clone(), own)?;
+        let common = self.common(frames.clone(), own)?;
+        let candidates = Candidates::new(self, &common);
         let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price * count as f64;
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
-        let mut asked = frames.start;
+        let mut coarsest = frames.start;
         for share_of_dn in SHARES {
-            (common.share_of_dn, common.given) = (share_of_dn, None);
-            let plan = self.plan_shared(asked, &common).filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price, 1))?;
+            let plan = candidates.plan(coarsest, Asked { share_of_dn, given: None });
+            let plan = plan.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price, 1))?;
             if !keeps_dn(&plan, own) {
                 return None;
             }
-            common.given = Some(Sampling::of(&plan));
-            let plans = self.plan_others(frames.clone(), plan, &common, own)?;
-            let coarsest = plans
+            let plans = candidates.plan_others(plan, own)?;
+            let too_coarse = plans
                 .iter()
                 .filter(|plan| !keeps_dn(plan, own))
                 .max_by(|a, b| a.predicted.picture_dn().total_cmp(&b.predicted.picture_dn()));
-            match coarsest {
-                Some(plan) => asked = plan.frame,
+            match too_coarse {
+                Some(plan) => coarsest = plan.frame,
                 None => return is_worth_it(plans.iter().map(|plan| plan.price).sum(), common.count()).then(|| together(plans)),
             }
         }
         None
-    }
-
-    /// `planned` and the others of `frames`, in order, as far as it takes to tell which of them are sampled too coarsely: the outermost are looked at first,
-    /// what does for them mostly does for those between. `None` where one does not keep `quality.max_error_px`.
-    fn plan_others(&self, frames: Range<u64>, planned: FramePlan, common: &Common, own: &FramePlan) -> Option<Vec<FramePlan>> {
-        let plan = |frame: u64| self.plan_shared(frame, common).filter(|plan| keeps_px(plan, own));
-        let done = planned.frame;
-        let mut plans = vec![planned];
-        for outermost in [frames.start, frames.end - 1].into_iter().filter(|&frame| frame != done) {
-            plans.push(plan(outermost)?);
-            if plans.iter().any(|plan| !keeps_dn(plan, own)) {
-                return Some(plans);
-            }
-        }
-        let between: Vec<u64> = (frames.start + 1..frames.end - 1).filter(|&frame| frame != done).collect();
-        plans.extend(between.into_par_iter().map(plan).collect::<Option<Vec<_>>>()?);
-        plans.sort_by_key(|plan| plan.frame);
-        Some(plans)
-    }
-
-    /// The plan of a frame from a common ideal frame; `None` where silhouettes would cost too much, and for a fault.
-    fn plan_shared(&self, frame: u64, common: &Common) -> Option<FramePlan> {
-        let look = self.look(frame, Some(common)).ok()?;
-        let scenery = look.scenery();
-        let scale = common.given.as_ref().map_or(FINEST_SCALE, |sampling| sampling.scale);
-        if !scenery.may_be_shared(&self.sequence.scenario.quality, scale) {
-            return None;
-        }
-        self.plan_of(&look, &scenery).ok()
     }
 
     /// The ideal frame that shows all that `frames` look at; `None` where it would be too large to be worth it.
@@ -236,7 +268,7 @@ impl Planner {
         let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
         let times = area(view.pixels(&reach.camera, scale).size_px) / area(own.ideal.size_px);
         let count = (frames.end - frames.start) as f64;
-        (times < MOST_AREA && times < (1.0 - WORTH) * count).then_some(Common { frames, key_s, view, share_of_dn: 1.0, given: None })
+        (times < MOST_AREA && times < (1.0 - WORTH) * count).then_some(Common { frames, key_s, view })
     }
 }
 
