@@ -24,13 +24,11 @@ use crate::temporal::{Footprint, TapStage};
 
 /// Frequencies that count, cycles an ideal pixel.
 const LOWEST: f64 = 0.031_25;
-const OCTAVES: u32 = 9;
-const AN_OCTAVE: u32 = 2;
-const GOLDEN: f64 = 0.618_033_988_749_895;
-/// Of a half-plane.
-const DIRECTIONS: u32 = 32;
-/// Where the source lies between ideal pixels: anywhere alike.
-const BESIDE_PX: [DVec2; 2] = [DVec2::new(0.13, 0.38), DVec2::new(0.62, 0.87)];
+const OCTAVES: f64 = 9.0;
+/// Waves that stand for all: of 252 ways to read borders their RMS is 0.96 to 1.10 times that of 30 000 waves, 2 % off in the RMS.
+const WAVES: u32 = 288;
+/// From one wave to the next, as parts of the range: direction, and where the source lies between ideal pixels.
+const STEP_OF_WAVES: [f64; 3] = [0.618_033_988_749_895, 0.754_877_666_246_693, 0.569_840_290_998_053];
 /// Steps of a doubling that widths are told apart by, and paths and samples.
 const STEPS: f64 = 8.0;
 const STEPS_OF_PATH: f64 = 4.0;
@@ -130,17 +128,18 @@ fn fewer(samples: u32) -> u32 {
 fn worked_out(&Reading { width_px, taps, exposure }: &Reading) -> f64 {
     let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
     let path = exposure.map(|(path_px, samples)| Path { along: path_px * DVec2::from_angle(ALONG), samples });
-    let wave = |i: u32, j: u32| {
-        // Not the same in all directions: what pixels make of fast waves goes up and down with each cycle.
-        let length = LOWEST * ((f64::from(i) + (f64::from(j) * GOLDEN).fract()) / f64::from(AN_OCTAVE)).exp2();
+    let wave = |i: u32| {
+        let i = f64::from(i) + 0.5;
+        let [direction, beside_x, beside_y] = STEP_OF_WAVES.map(|step| (i * step).fract());
+        let length = LOWEST * (OCTAVES * i / f64::from(WAVES)).exp2();
         // The other half-plane is its mirror image.
-        let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
-        let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
+        let weight = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
+        let f = length * DVec2::from_angle(PI * direction);
         let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
-        let error = |beside_px: DVec2| (read_wave(f, &area, path, beside_px)[1] - DVec2::new(exact, 0.0)).length_squared();
-        weight / (4.0 * (PI * length).powi(3)) * BESIDE_PX.into_iter().map(error).sum::<f64>() / BESIDE_PX.len() as f64
+        let found = read_wave(f, &area, path, DVec2::new(beside_x, beside_y))[1];
+        weight / (4.0 * (PI * length).powi(3)) * (found - DVec2::new(exact, 0.0)).length_squared()
     };
-    let square: f64 = (0..OCTAVES * AN_OCTAVE).flat_map(|i| (0..DIRECTIONS).map(move |j| (i, j))).map(|(i, j)| wave(i, j)).sum();
+    let square: f64 = (0..WAVES).map(wave).sum();
     // A border of a length in output pixels is as many times longer in ideal pixels as those are smaller, their area by the square of it.
     square / width_px
 }
