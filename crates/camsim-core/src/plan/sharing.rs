@@ -3,7 +3,7 @@
 //!
 //! Frames are looked at in groups that begin at multiples of `quality.frames_per_ideal`, so that which of them share depends on the scenario alone. The
 //! ideal frame is taken in the middle of their time, wide and fine enough for all of them. Each of them is then planned as any other: from this one key frame,
-//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise each of its halves
+//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise, or where that saves little, each of its halves
 //! is tried, and so on. Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind them.
 
 use std::{
@@ -29,7 +29,9 @@ const MOST_AREA: f64 = 4.0;
 /// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it.
 const SHARES: [f64; 3] = [1.0, 1.0, 0.85];
 /// From so many frames on the halves of a group are tried each for itself.
-const FAR: usize = 8;
+const FAR: u64 = 8;
+/// A group that takes less than this part of the time of single frames is not compared with its halves.
+const GOOD: f64 = 0.65;
 /// Groups that are remembered: frames are asked for in order, by a few threads.
 const REMEMBERED: usize = 4;
 
@@ -201,7 +203,7 @@ impl Planner {
             let middle = (first + frames.end) / 2;
             if let Ok(own) = self.plan_alone(middle) {
                 if !own.edges.has_rays() {
-                    self.share(frames, &own, &mut plans);
+                    plans = self.share(frames, &own);
                 }
                 if let Some(place) = plans.get_mut((middle - first) as usize) {
                     place.get_or_insert(own);
@@ -211,22 +213,23 @@ impl Planner {
         Group { number, first, plans }
     }
 
-    /// Plans `frames` from one ideal frame, or from as few as will do; `false` if none of them shares.
-    fn share(&self, frames: Range<u64>, own: &FramePlan, plans: &mut [Option<FramePlan>]) -> bool {
-        if let Some(shared) = self.shared(frames.clone(), own) {
-            plans.iter_mut().zip(shared).for_each(|(plan, shared)| *plan = Some(shared));
-            return true;
+    /// Plans of `frames` from one ideal frame, or from those of its halves, whichever takes less time; `None` for those that do not share.
+    fn share(&self, frames: Range<u64>, own: &FramePlan) -> Vec<Option<FramePlan>> {
+        let count = (frames.end - frames.start) as usize;
+        let whole: Option<Vec<_>> = self.shared(frames.clone(), own).map(|plans| plans.into_iter().map(Some).collect());
+        let price =
+            |plans: &[Option<FramePlan>]| -> f64 { plans.iter().map(|plan| plan.as_ref().map_or(own.price, |plan| plan.price)).sum() };
+        let half = count as u64 / 2;
+        let is_good = whole.as_ref().is_some_and(|whole| price(whole) < GOOD * own.price * count as f64);
+        if is_good || half < 2 {
+            return whole.unwrap_or_else(|| vec![None; count]);
         }
-        let half = plans.len() / 2;
-        if half < 2 {
-            return false;
-        }
-        let middle = frames.start + half as u64;
-        let (before, after) = plans.split_at_mut(half);
-        let is_first_shared = self.share(frames.start..middle, own, before);
+        let middle = frames.start + half;
+        let mut halves = self.share(frames.start..middle, own);
         // What the first half cannot do the second hardly can, unless it is far away.
-        let is_second_shared = (is_first_shared || half >= FAR) && self.share(middle..frames.end, own, after);
-        is_first_shared || is_second_shared
+        let is_worth_a_try = halves.iter().any(Option::is_some) || half >= FAR;
+        halves.extend(if is_worth_a_try { self.share(middle..frames.end, own) } else { vec![None; count - halves.len()] });
+        whole.filter(|whole| price(whole) <= price(&halves)).unwrap_or(halves)
     }
 
     /// Plans of `frames` from one ideal frame, if each is as good as one by itself and cheaper. `own` is such a one.
