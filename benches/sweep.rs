@@ -9,7 +9,7 @@
 use std::{convert::Infallible, path::PathBuf, process::Command, sync::Arc, time::Duration};
 
 use camsim::{
-    core::{scenario::Channel, sequence::Sequence},
+    core::{frame::COORDS_CHANNELS, scenario::Channel, sequence::Sequence},
     gpu::{AdapterChoice, Engine},
     io::{load::load_sequence, scenario_file::read_scenario},
     lab::timing::{peak_memory_mb, quartiles},
@@ -257,19 +257,31 @@ fn preset() -> Outcome<Arc<Sequence>> {
     changed(&[("quality.preset", "\"paper\"".to_owned())])
 }
 
-/// From the exposure's begin to its end, in pixels of the camera: where two renderings say that the source is.
+/// Frames in which paths are measured, and parts of each.
+const PATH_FRAMES: [u64; 4] = [40, 56, 72, 88];
+const PATH_PARTS: u8 = 12;
+
+/// Length of the path that a pixel's source takes over the exposure, in pixels of the camera: where renderings say that the source is at instants of it.
 fn median_path_px(engine: &Engine, sequence: &Arc<Sequence>) -> Outcome<f64> {
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Coords])?;
-    let mut ends = Vec::new();
-    for phase in [-0.5, 0.5] {
-        session.set_coords_phase(phase);
-        session.render::<Infallible>([40], &mut |finished| {
-            ends.push((finished.frame.coords, finished.plan.ideal.focal_px.x));
-            Ok(())
-        })?;
+    let mut medians = Vec::new();
+    for frame in PATH_FRAMES {
+        let mut before: Option<Vec<[f32; COORDS_CHANNELS]>> = None;
+        let mut paths = Vec::new();
+        for part in 0..=PATH_PARTS {
+            session.set_coords_phase(f32::from(part) / f32::from(PATH_PARTS) - 0.5);
+            session.render::<Infallible>([frame], &mut |finished| {
+                let now = finished.frame.coords.unwrap_or_default();
+                let scale = finished.plan.ideal.focal_px.x / sequence.scenario.camera.focal_px[0];
+                paths.resize(now.len(), 0.0);
+                for ((path, now), before) in paths.iter_mut().zip(&now).zip(before.iter().flatten()) {
+                    *path += f64::from((now[2] - before[2]).hypot(now[3] - before[3])) / scale;
+                }
+                before = Some(now);
+                Ok(())
+            })?;
+        }
+        medians.push(quartiles(&paths.into_iter().filter(|path| path.is_finite()).collect::<Vec<_>>())[1]);
     }
-    let [(Some(begin), focal_px), (Some(end), _)] = &ends[..] else { return Err("coordinates were asked for".into()) };
-    let scale = focal_px / sequence.scenario.camera.focal_px[0];
-    let paths = begin.iter().zip(end).map(|(a, b)| f64::from((a[2] - b[2]).hypot(a[3] - b[3])) / scale);
-    Ok(quartiles(&paths.filter(|path| path.is_finite()).collect::<Vec<_>>())[1])
+    Ok(quartiles(&medians)[1])
 }
