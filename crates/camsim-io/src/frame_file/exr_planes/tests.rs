@@ -68,6 +68,26 @@ fn blenders_multilayer_files_need_no_names() {
 }
 
 #[test]
+fn mist_is_no_depth() {
+    let without_depth: Vec<(&str, f32)> = BLENDER.iter().copied().filter(|(name, _)| !name.contains("Depth")).collect();
+    let error = read(&[("", 0, &without_depth)], DEPTH).unwrap_err();
+    assert!(error.contains("has no channel Z, but ViewLayer.Combined.A"), "{error}");
+    let asked = read(&[("", 0, &without_depth)], &format!("{DEPTH}depth_channel = \"Mist.Z\"\n"));
+    assert_eq!(first(&asked.unwrap())[3], 0.5);
+}
+
+#[test]
+fn the_optical_axis_is_in_the_middle_of_the_display() {
+    let axis_px = |at: i32, text: &str| {
+        let file = read(&[("", at, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}")).unwrap();
+        file.frame.geometry.principal_px.to_array()
+    };
+    // The display is pixels 0 and 1. Of it a crop that begins at 1, and more of it than is shown from -1 on.
+    assert_eq!([axis_px(0, ""), axis_px(1, ""), axis_px(-1, "")], [[0.5, 0.0], [-0.5, 0.0], [1.5, 0.0]]);
+    assert_eq!(axis_px(1, "principal_point_px = [3, 4]\n"), [3.0, 4.0]);
+}
+
+#[test]
 fn every_part_is_read() {
     let parts: [Part<'_>; 3] = [
         ("rgba", 0, &[("B", 0.75), ("G", 0.5), ("R", 0.25)]),
