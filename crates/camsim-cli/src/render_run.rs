@@ -99,6 +99,7 @@ pub fn run(
         warnings: job.warnings.to_vec(),
     };
     manifest.write(job.folder).or_failed()?;
+    files.sweep(&todo);
     write_tables(job, &files, source.planner())?;
 
     let writes_frames = !scenario.output.format.is_empty();
