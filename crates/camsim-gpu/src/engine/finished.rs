@@ -30,6 +30,8 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
+    /// Rings of blended triangles that cover each other in turn: of each a part is mixed in the wrong order.
+    pub rings: u32,
     /// Where its time went.
     pub times: FrameTimes,
 }
