@@ -114,7 +114,7 @@ pub fn run(
         }
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
-        rings.add(finished.plan.frame, finished.rings);
+        rings.add(finished.plan.frame, finished.out_of_order);
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
         bar.inc(1);
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))

@@ -86,22 +86,22 @@ pub struct Rings {
 
 impl Rings {
     /// Takes in a frame.
-    pub fn add(&mut self, frame: u64, rings: u32) {
-        if rings > 0 {
+    pub fn add(&mut self, frame: u64, out_of_order: u32) {
+        if out_of_order > 0 {
             self.frames += 1;
-            if self.worst.is_none_or(|(most, _)| rings > most) {
-                self.worst = Some((rings, frame));
+            if self.worst.is_none_or(|(most, _)| out_of_order > most) {
+                self.worst = Some((out_of_order, frame));
             }
         }
     }
 
     /// What the user should know.
     pub fn warning(&self, of: usize) -> Option<String> {
-        let (rings, frame) = self.worst?;
+        let (most, frame) = self.worst?;
         let frames = self.frames;
         Some(format!(
-            "in {frames} of {of} frames blended triangles cover each other in rings, up to {rings} in frame {frame}: no order is right for all of \
-             them, and no prediction counts it; `camsim verify --pictures` measures it, quality.solver = \"oracle\" does without"
+            "in {frames} of {of} frames blended triangles cover each other in rings, so that up to {most}, in frame {frame}, are mixed before what is \
+             behind them, which no prediction counts; `camsim verify --pictures` measures it, quality.solver = \"oracle\" does without"
         ))
     }
 }
@@ -143,7 +143,10 @@ mod tests {
         assert_eq!(rings.warning(0), None);
         [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)].into_iter().for_each(|(frame, count)| rings.add(frame, count));
         let said = rings.warning(5).unwrap();
-        assert!(said.starts_with("in 4 of 5 frames blended triangles cover each other in rings, up to 7 in frame 5: "), "{said}");
+        assert!(
+            said.starts_with("in 4 of 5 frames blended triangles cover each other in rings, so that up to 7, in frame 5, are mixed before"),
+            "{said}"
+        );
     }
 
     #[test]

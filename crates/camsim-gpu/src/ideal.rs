@@ -265,7 +265,7 @@ impl IdealPass {
             self.silhouettes = Some(SilhouettePasses { marks: MarksPass::new(gpu)?, near_marks });
         }
         let mut middle_lod = LodSelection::default();
-        let mut rings = 0;
+        let mut out_of_order = 0;
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = base_ned_m(&key.pose);
@@ -281,7 +281,7 @@ impl IdealPass {
             let seen = place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
             if let Some(layers) = &mut slot.layers {
                 layers.order(gpu, recorder, buffers, &slot.drawn, &seen, &key.pose, tolerance.tangents)?;
-                rings += layers.rings;
+                out_of_order += layers.out_of_order;
             }
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
@@ -312,7 +312,7 @@ impl IdealPass {
             marks.stamp(gpu, recorder, target, fine);
             marks.borders(gpu, recorder, plan, target, fine);
         }
-        Ok((middle_lod, rings))
+        Ok((middle_lod, out_of_order))
     }
 
     /// Draws each key's surfaces, one key below the other.

@@ -47,8 +47,8 @@ struct Ready {
 pub struct PaintOrder {
     /// Their places, from behind to the front.
     pub places: Vec<u32>,
-    /// Rings of triangles that cover each other in turn, of each of which one is drawn before what is behind it.
-    pub rings: u32,
+    /// Of triangles that cover each other in a ring, those that are drawn before something behind them.
+    pub out_of_order: u32,
 }
 
 /// The order of triangles; `None` where there are too many of them, or of pairs. Corners are in the camera's axes (x right, y down, z ahead), metres.
@@ -94,10 +94,10 @@ fn resolved(seen: &[Seen], in_front: &[Vec<u32>], mut behind: Vec<u32>) -> Paint
     from_afar.sort_by_key(|&place| std::cmp::Reverse(ready(place)));
     let mut from_afar = from_afar.into_iter();
     let mut taken = vec![false; seen.len()];
-    let mut order = PaintOrder { places: Vec::with_capacity(seen.len()), rings: 0 };
+    let mut order = PaintOrder { places: Vec::with_capacity(seen.len()), out_of_order: 0 };
     while order.places.len() < seen.len() {
         let next = open.pop().map(|ready| ready.place).or_else(|| {
-            order.rings += 1;
+            order.out_of_order += 1;
             from_afar.find(|&place| !taken[place as usize])
         });
         let Some(place) = next else { break };
@@ -264,7 +264,7 @@ mod tests {
         let mut all = order.places.clone();
         all.sort_unstable();
         assert_eq!(all, (0..300).collect::<Vec<_>>(), "each once");
-        assert_eq!((wrong_places(&triangles, &order.places), order.rings), (0, 0));
+        assert_eq!((wrong_places(&triangles, &order.places), order.out_of_order), (0, 0));
         let naive = wrong_places(&triangles, &by_distance(&triangles));
         assert!(naive > 10, "distance alone would not do: {naive}");
     }
@@ -280,7 +280,7 @@ mod tests {
         assert!(triangles[0].iter().sum::<DVec3>().length() > triangles[1].iter().sum::<DVec3>().length());
         assert_eq!(back_to_front(&triangles).unwrap().places, [1, 0]);
         let behind = [pane(12.0, 1.0, 11.0), pane(0.0, 30.0, 10.0)];
-        assert_eq!(back_to_front(&behind).unwrap(), PaintOrder { places: vec![0, 1], rings: 0 });
+        assert_eq!(back_to_front(&behind).unwrap(), PaintOrder { places: vec![0, 1], out_of_order: 0 });
     }
 
     #[test]
@@ -315,9 +315,9 @@ mod tests {
         assert_eq!((after.len() - before.len(), 0), (done.more, done.left));
         assert!(done.more > 100 && after.len() < 20 * before.len(), "{done:?}");
         assert!((area(&after) / area(&before) - 1.0).abs() < 1e-5, "nothing is lost");
-        // Rings are counted where they are: before the cut pairs that cross are in their place.
-        let rings = back_to_front(&after).unwrap().rings;
-        assert!((1..40).contains(&rings), "{rings} rings");
+        // They are counted: a few of all.
+        let out_of_order = back_to_front(&after).unwrap().out_of_order;
+        assert!(out_of_order > 0 && (out_of_order as usize) < after.len() / 4, "{out_of_order} of {}", after.len());
         assert!(wrong(&before) > 100 && wrong(&after) < wrong(&before) / 4, "{} {}", wrong(&before), wrong(&after));
         // What is left are rings: of each two by themselves the order is right.
         let unlike = |triangles: &[[DVec3; 3]]| {
@@ -347,8 +347,8 @@ mod tests {
         let mut triangles =
             vec![bar(0.0), bar(1.0), bar(2.0), across, across.map(|at| DVec3::new(-at.x, at.y, at.z)), across.map(|at| -at)];
         triangles.extend([[DVec3::ZERO; 3], [DVec3::NAN; 3], [DVec3::INFINITY; 3], [DVec3::Z; 3]]);
-        assert_eq!(back_to_front(&triangles[..3]).unwrap().rings, 1);
-        assert_eq!(back_to_front(&triangles[..2]).unwrap().rings, 0);
+        assert_eq!(back_to_front(&triangles[..3]).unwrap().out_of_order, 1);
+        assert_eq!(back_to_front(&triangles[..2]).unwrap().out_of_order, 0);
         let mut order = back_to_front(&triangles).unwrap();
         order.places.sort_unstable();
         assert_eq!(order.places, (0..10).collect::<Vec<_>>());

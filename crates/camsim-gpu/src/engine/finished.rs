@@ -30,8 +30,8 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
-    /// Rings of blended triangles that cover each other in turn: of each a part is mixed in the wrong order.
-    pub rings: u32,
+    /// Blended triangles that are mixed before something behind them, since they cover each other in rings; of all ideal frames.
+    pub out_of_order: u32,
     /// Where its time went.
     pub times: FrameTimes,
 }

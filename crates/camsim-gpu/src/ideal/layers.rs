@@ -22,8 +22,8 @@ const FEWER_TRIANGLES: &str = "have fewer triangles with alphaMode BLEND, or mak
 pub(super) struct Ordered {
     indices: wgpu::Buffer,
     draws: Vec<Draw>,
-    /// Rings of triangles that have no order.
-    pub rings: u32,
+    /// Triangles in rings that are drawn before something behind them.
+    pub out_of_order: u32,
 }
 
 /// Triangles of one mesh that follow each other.
@@ -45,7 +45,7 @@ struct Triangle {
 
 impl Ordered {
     pub fn new(gpu: &GpuContext) -> Self {
-        Self { indices: index_buffer(gpu, 0), draws: Vec::new(), rings: 0 }
+        Self { indices: index_buffer(gpu, 0), draws: Vec::new(), out_of_order: 0 }
     }
 
     /// Finds and writes the order. `drawn` says which placements are drawn of each batch, `seen` whose those are.
@@ -72,8 +72,8 @@ impl Ordered {
             }
         }
         let places: Vec<[DVec3; 3]> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
-        let order = back_to_front(&places).unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), rings: 0 });
-        self.rings = order.rings;
+        let order = back_to_front(&places).unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), out_of_order: 0 });
+        self.out_of_order = order.out_of_order;
         self.draws = runs(&triangles, &order.places);
         let indices: Vec<u32> = order.places.iter().flat_map(|&k| triangles[k as usize].corners).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&indices);

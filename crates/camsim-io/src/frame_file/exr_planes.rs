@@ -37,8 +37,14 @@ pub(super) struct Planes {
 
 /// Reads every part.
 pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
-    let image = read_all_flat_layers_from_file(path)
-        .map_err(|error| failure(path, format!("cannot be read as EXR: {error}; paths are relative to FRAME.toml")))?;
+    let image = read_all_flat_layers_from_file(path).map_err(|error| {
+        let fix = match &error {
+            exr::error::Error::NotSupported(_) => "write it with ZIP compression, and not deep",
+            exr::error::Error::Io(_) => "paths are relative to FRAME.toml",
+            _ => "it is cut off, or no EXR",
+        };
+        failure(path, format!("cannot be read as EXR: {error}; {fix}"))
+    })?;
     let several = image.layer_data.len() > 1;
     let display = image.attributes.display_window;
     let middle = |from: i32, length: usize| f64::from(from) + 0.5 * (length as f64 - 1.0);

@@ -127,3 +127,14 @@ fn what_cannot_be_told_apart_is_listed() {
     }
     assert_eq!(first(&read(&plain, &format!("{DEPTH}depth_channel = \"dist\"\n")).unwrap())[3], 2.0);
 }
+
+#[test]
+fn files_that_are_none_are_told_from_files_that_are_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("FRAME.toml");
+    fs::write(&path, "color = \"a.exr\"\nfocal_px = [2, 2]\n").unwrap();
+    let error = || read_frame(&path).unwrap_err().to_string();
+    assert!(error().contains("a.exr: cannot be read as EXR: ") && error().ends_with("paths are relative to FRAME.toml"), "{}", error());
+    fs::write(folder.path().join("a.exr"), "no picture").unwrap();
+    assert!(error().ends_with("it is cut off, or no EXR"), "{}", error());
+}
