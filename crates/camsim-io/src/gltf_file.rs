@@ -244,8 +244,7 @@ impl Reader<'_> {
             let corner_m =
                 shape.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length()).fold(0.0, f64::max);
             let reach_m = model_from_shape.translation.length() + corner_m * norm(&model_from_shape.matrix3);
-            // Not a number is not within either.
-            if !(reach_m <= FARTHEST_M) {
+            if reach_m.is_nan() || reach_m > FARTHEST_M {
                 let (node, mesh) = (node.index(), mesh.index());
                 return Err(self.source.broken(format!(
                     "nodes.{node}: with it meshes.{mesh} reaches {reach_m:.1e} m from the model's origin, more than {FARTHEST_M:.0e}: check its \
