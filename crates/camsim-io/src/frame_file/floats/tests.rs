@@ -50,7 +50,7 @@ fn what_stands_for_the_sky_is_said() {
         read("d.pfm", &pfm("Pf\n3 2\n-1\n", &DEPTH_M, f32::to_le_bytes), &text).unwrap()
     };
     assert_eq!(file("depth_max_m = 65504\nholes = \"mark\"\n").frame.holes, [false, false, true, false, true, true]);
-    assert_eq!(file("depth_max_m = 65504.5\nholes = \"mark\"\n").frame.holes[5], false);
+    assert!(!file("depth_max_m = 65504.5\nholes = \"mark\"\n").frame.holes[5]);
     assert_eq!(file("depth_max_m = 4\n").frame.inverse_depth, [1.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
     // Blender's background, whatever is said.
     let blender = pfm("Pf\n3 2\n-1\n", &[1e10, 1e9, 9e8, 1.0, 1.0, 1.0], f32::to_le_bytes);
