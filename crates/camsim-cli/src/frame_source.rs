@@ -111,7 +111,7 @@ impl FrameSource for Rays {
             let plan = self.planner.plan(frame).or_bad_input()?;
             let options = RenderOptions { key: Some(KeyFrame { pose: plan.key_pose, ideal: plan.ideal }), ..self.options.clone() };
             let frame = self.oracle.render(frame, &options);
-            sink(Finished { frame, plan, lod: LodSelection::default(), times: FrameTimes::default() }).or_failed()?;
+            sink(Finished { frame, plan, lod: LodSelection::default(), out_of_order: 0, times: FrameTimes::default() }).or_failed()?;
         }
         Ok(())
     }

@@ -21,7 +21,7 @@ use crate::{
     frame_list::Shard,
     frame_source::FrameSource,
     progress::{frames_bar, waiting},
-    tolerances::Tolerances,
+    tolerances::{Rings, Tolerances},
 };
 
 /// What to render and where to.
@@ -99,11 +99,12 @@ pub fn run(
         warnings: job.warnings.to_vec(),
     };
     manifest.write(job.folder).or_failed()?;
+    files.sweep(&todo);
     write_tables(job, &files, source.planner())?;
 
     let writes_frames = !scenario.output.format.is_empty();
     let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
-    let (mut blind, mut empty) = (0_u64, 0_u64);
+    let (mut blind, mut empty, mut rings) = (0_u64, 0_u64, Rings::default());
     let mut tolerances = Tolerances::new(&scenario.quality);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
@@ -113,13 +114,15 @@ pub fn run(
         }
         blind += u64::from(finished.plan.motion.nearest_m.is_infinite());
         empty += u64::from(is_empty(&finished.frame));
+        rings.add(finished.plan.frame, finished.out_of_order);
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
         bar.inc(1);
         writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
     });
     bar.finish_and_clear();
     rendered?;
-    let said: Vec<String> = unseen_warnings(blind, empty, todo.len()).chain(tolerances.iter().flat_map(Tolerances::warnings)).collect();
+    let unseen = unseen_warnings(blind, empty, todo.len()).chain(rings.warning(todo.len()));
+    let said: Vec<String> = unseen.chain(tolerances.iter().flat_map(Tolerances::warnings)).collect();
     said.iter().for_each(|warning| console.warn(warning));
     manifest.warnings.extend(said);
     let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);

@@ -1,4 +1,4 @@
-//! Which frames of a run do not keep the tolerances, by their plans.
+//! Which frames of a run do not keep the tolerances, by their plans, or may not for what no plan knows.
 
 use camsim_core::{
     plan::FramePlan,
@@ -76,6 +76,36 @@ impl Broken {
     }
 }
 
+/// Frames whose blended surfaces cover each other in rings: of what that costs no plan knows.
+#[derive(Debug, Default)]
+pub struct Rings {
+    frames: usize,
+    /// Most in a frame, and in which.
+    worst: Option<(u32, u64)>,
+}
+
+impl Rings {
+    /// Takes in a frame.
+    pub fn add(&mut self, frame: u64, out_of_order: u32) {
+        if out_of_order > 0 {
+            self.frames += 1;
+            if self.worst.is_none_or(|(most, _)| out_of_order > most) {
+                self.worst = Some((out_of_order, frame));
+            }
+        }
+    }
+
+    /// What the user should know.
+    pub fn warning(&self, of: usize) -> Option<String> {
+        let (most, frame) = self.worst?;
+        let frames = self.frames;
+        Some(format!(
+            "in {frames} of {of} frames blended triangles cover each other in rings, so that up to {most}, in frame {frame}, are mixed before what is \
+             behind them, which no prediction counts; `camsim verify --pictures` measures it, quality.solver = \"oracle\" does without"
+        ))
+    }
+}
+
 /// Without an exponent where there is no need for one.
 fn two_digits(error: f64) -> String {
     if error < 0.01 {
@@ -105,6 +135,18 @@ mod tests {
         let wanted = "3 of 4 frames do not keep quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
                       `camsim explain --frame 5` says why";
         assert_eq!(said, [wanted]);
+    }
+
+    #[test]
+    fn rings_are_told_of_the_frame_with_most() {
+        let mut rings = Rings::default();
+        assert_eq!(rings.warning(0), None);
+        [(3, 0), (4, 2), (5, 7), (6, 7), (7, 1)].into_iter().for_each(|(frame, count)| rings.add(frame, count));
+        let said = rings.warning(5).unwrap();
+        assert!(
+            said.starts_with("in 4 of 5 frames blended triangles cover each other in rings, so that up to 7, in frame 5, are mixed before"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -167,6 +167,8 @@ struct Drawn {
     /// The slot of its frame.
     slot: usize,
     lod: LodSelection,
+    /// Of what is mixed.
+    out_of_order: u32,
 }
 
 /// One sequence on the device.
@@ -198,6 +200,7 @@ struct InFlight {
     plan: FramePlan,
     submission: wgpu::SubmissionIndex,
     lod: LodSelection,
+    out_of_order: u32,
     times: FrameTimes,
 }
 
@@ -291,9 +294,9 @@ impl Session<'_> {
         let submit_ms = ms_since(begun);
         self.slots[slot].recall();
         self.engine.check()?;
-        let lod = self.drawn.as_ref().map(|drawn| drawn.lod).unwrap_or_default();
+        let (lod, out_of_order) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
         let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, submit_ms, ..FrameTimes::default() };
-        Ok(InFlight { slot, plan: prepared.plan, submission, lod, times })
+        Ok(InFlight { slot, plan: prepared.plan, submission, lod, out_of_order, times })
     }
 
     /// Every pass of a frame, in order.
@@ -379,7 +382,7 @@ impl Session<'_> {
             tiles.dedup();
             pool.bring(gpu, &tiles)?;
         }
-        let lod = self.ideal_pass.encode(
+        let (lod, out_of_order) = self.ideal_pass.encode(
             gpu,
             recorder,
             ideal_slots,
@@ -400,6 +403,7 @@ impl Session<'_> {
             target,
             slot,
             lod,
+            out_of_order,
         });
         Ok(())
     }
@@ -474,7 +478,7 @@ impl Session<'_> {
         if let Some(clock) = &slot.clock {
             times.passes = clock.passes(gpu, &read_mapped(clock.on_host())?);
         }
-        Ok(Finished { frame, plan, lod: done.lod, times })
+        Ok(Finished { frame, plan, lod: done.lod, out_of_order: done.out_of_order, times })
     }
 }
 

@@ -251,7 +251,7 @@ impl IdealPass {
         meshes: &[PlacedMesh],
         tolerance: &LevelTolerance,
         target: &IdealTarget,
-    ) -> Result<LodSelection, RenderErrorBase> {
+    ) -> Result<(LodSelection, u32), RenderErrorBase> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
@@ -265,6 +265,7 @@ impl IdealPass {
             self.silhouettes = Some(SilhouettePasses { marks: MarksPass::new(gpu)?, near_marks });
         }
         let mut middle_lod = LodSelection::default();
+        let mut out_of_order = 0;
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = base_ned_m(&key.pose);
@@ -280,6 +281,7 @@ impl IdealPass {
             let seen = place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
             if let Some(layers) = &mut slot.layers {
                 layers.order(gpu, recorder, buffers, &slot.drawn, &seen, &key.pose, tolerance.tangents)?;
+                out_of_order += layers.out_of_order;
             }
             if k == plan.keys.len() / 2 {
                 middle_lod = lod;
@@ -310,7 +312,7 @@ impl IdealPass {
             marks.stamp(gpu, recorder, target, fine);
             marks.borders(gpu, recorder, plan, target, fine);
         }
-        Ok(middle_lod)
+        Ok((middle_lod, out_of_order))
     }
 
     /// Draws each key's surfaces, one key below the other.

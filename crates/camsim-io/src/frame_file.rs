@@ -5,14 +5,16 @@
 //! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR
 //! color_channels = ["R", "G", "B"]   # of an EXR, one is grey; a whole name, or the end of one: "Combined.R"
 //! color_layer = "ViewLayer.Combined" # of an EXR: its channels are taken from there
-//! depth = "depth.exr"                # EXR Z in metres, 16-bit PNG or PGM with depth_per_metre, or packed24
+//! depth = "depth.exr"                # EXR Z, PFM or TIFF of floats in metres, 16-bit PNG, PGM or TIFF with depth_per_metre, or packed24
 //! depth_channel = "Depth.Z"          # of an EXR, and depth_layer, as above
 //! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
 //! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers only: 0.001 to 1e6
+//! depth_rows = "bottom-up"           # of a PFM: the row that it begins with; "top-down" as AirSim writes them
 //! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
+//! depth_max_m = 1e9                  # what is stored as that far, or farther, is no depth: the value that stands for the sky
 //! holes = "far"                      # where there is no depth; "nearest": that of the nearest pixel that has one; "mark": nothing is shown
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
-//! principal_point_px = [543.5, 407.5]  # default: its centre
+//! principal_point_px = [543.5, 407.5]  # default: its centre; of an EXR that of the display window
 //! instant_ms = 0.0                   # when it was taken, from the stamp t_i
 //! [motion]                           # a twist about the frame's instant, in camera axes ...
 //! velocity_m_s = [0.0, 0.0, 0.0]
@@ -31,7 +33,7 @@
 //!
 //! Many frames in one file: [`list`] says how they are named.
 //!
-//! Depth that is 0, negative, infinite or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone,
+//! Depth that is 0, negative, infinite, at least `depth_max_m` or not a number is **unknown or sky: taken as infinitely far**, so it moves with the rotation alone,
 //! or, with `holes = "nearest"`, as what is beside it (a depth camera's shadows; not for pictures with sky), or, with `holes = "mark"`, not
 //! at all: output pixels that look there are invalid.
 //! A picture of nothing but 0 and infinity may be sky; one of nothing but what no depth can be (negative, not a number, nearer than a
@@ -54,6 +56,7 @@ use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
 mod depth;
 mod exr_planes;
+mod floats;
 mod flow;
 mod images;
 pub mod list;
@@ -125,6 +128,8 @@ struct FrameSpec {
     #[serde(default)]
     depth_encoding: DepthEncoding,
     depth_per_metre: Option<f64>,
+    depth_rows: Option<DepthRows>,
+    depth_max_m: Option<f64>,
     #[serde(default)]
     depth_kind: DepthKind,
     #[serde(default)]
@@ -173,6 +178,14 @@ enum DepthEncoding {
     #[default]
     Plain,
     Packed24,
+}
+
+/// Which row a PFM file begins with: the format says the bottom one, and not everybody keeps to it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum DepthRows {
+    TopDown,
+    BottomUp,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -258,6 +271,9 @@ fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     if !spec.instant_ms.is_finite() {
         return fail("instant_ms", "must be a finite number of milliseconds; 0 is the stamp");
     }
+    if spec.depth_max_m.is_some_and(|most| most.is_nan() || most <= 0.0) {
+        return fail("depth_max_m", "must be above 0, in metres: what is stored as that far, or farther, is no depth");
+    }
     if spec.principal_point_px.is_some_and(|centre| centre.iter().any(|v| !v.is_finite())) {
         return fail("principal_point_px", "must be two finite numbers; leave the key out for the picture's centre");
     }
@@ -272,8 +288,7 @@ fn read_pictures(spec: &FrameSpec, color: &Path, depth: Option<&Path>, motion: M
     let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
     let color = images::read_color(color, spec, path)?;
     let size_px @ [width, height] = color.size_px;
-    let centre = [0.5 * (f64::from(width) - 1.0), 0.5 * (f64::from(height) - 1.0)];
-    let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(centre));
+    let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(color.centre_px));
     let geometry = IdealGeometry { size_px, focal_px: DVec2::from_array(spec.focal_px), principal_px };
     let mut inverse_depth = match depth {
         Some(depth) => depth::read_inverse_depth(depth, spec, &geometry, color.origin_px, path)?,

@@ -14,6 +14,7 @@ use camsim_core::scene::{Material, Mesh, Shape};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
+mod checks;
 mod emitted;
 mod material;
 mod normals;
@@ -89,6 +90,8 @@ const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec
 
 /// Parts of a scene, at most: a slip in a number must not fill the memory.
 const MOST_PARTS: usize = 1 << 20;
+/// No point of a model is farther from its origin, metres: what claims to be is a slip in a number.
+const FARTHEST_M: f64 = 1e9;
 /// Nodes within nodes, at most.
 const DEEPEST: usize = 1024;
 
@@ -209,6 +212,10 @@ impl Reader<'_> {
             if uv.loses_colors && primitive.get(&gltf::Semantic::Colors(0)).is_some() {
                 self.notes.push("vertex colours under a picture of emitted light are left out".into());
             }
+            if uv.has_picture() && primitive.get(&gltf::Semantic::TexCoords(uv.set)).is_none() {
+                let (number, set) = (mesh.index(), uv.set);
+                self.notes.push(format!("meshes.{number}: has no TEXCOORD_{set} for its picture to lie by: one texel of it is all over"));
+            }
             let shape = match self.shapes.get(&key).filter(|_| !own) {
                 Some(shape) => shape.clone(),
                 None => {
@@ -234,6 +241,16 @@ impl Reader<'_> {
             if !own {
                 self.shapes.insert(key, shape.clone());
             }
+            let corner_m =
+                shape.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length()).fold(0.0, f64::max);
+            let reach_m = model_from_shape.translation.length() + corner_m * norm(&model_from_shape.matrix3);
+            if reach_m.is_nan() || reach_m > FARTHEST_M {
+                let (node, mesh) = (node.index(), mesh.index());
+                return Err(self.source.broken(format!(
+                    "nodes.{node}: with it meshes.{mesh} reaches {reach_m:.1e} m from the model's origin, more than {FARTHEST_M:.0e}: check its \
+                     positions, and translation, rotation and scale of its nodes"
+                )));
+            }
             if !shape.indices.is_empty() {
                 let material = self.materials.on(&shape, material);
                 self.parts.push(Part { shape, material, model_from_shape });
@@ -241,6 +258,11 @@ impl Reader<'_> {
         }
         Ok(())
     }
+}
+
+/// At least how much longer a matrix makes anything.
+fn norm(matrix: &DMat3) -> f64 {
+    (matrix.x_axis.length_squared() + matrix.y_axis.length_squared() + matrix.z_axis.length_squared()).sqrt()
 }
 
 #[cfg(test)]

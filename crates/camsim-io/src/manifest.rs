@@ -138,7 +138,7 @@ pub fn in_shard(index: u64, [i, n]: [u64; 2]) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
-    use crate::scenario_file::parse_scenario;
+    use crate::scenario_file::{parse_scenario, read_scenario};
 
     fn scenario(sets: &[(&str, &str)]) -> Scenario {
         let sets: Vec<_> = sets.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
@@ -179,6 +179,60 @@ mod tests {
 
         std::fs::write(dir.path().join("run.json"), "{").unwrap();
         assert!(matches!(check_resume(dir.path(), &other), Err(ResumeError::Parse { .. })));
+    }
+
+    #[test]
+    fn the_run_of_a_manifest_can_be_made_again() {
+        let dir = tempfile::tempdir().unwrap();
+        let text = r#"
+            seed = 9
+            [flight]
+            log = "logs/a.csv"
+            window_s = [1.0, 2.5]
+            origin = [46.5, 7.25, 900.0]
+            [camera.shutter]
+            interlace_ms = "field"
+            [[camera.mount.vibration]]
+            axis = "roll"
+            amplitude_deg = 0.1
+            hz = 30.0
+            phase_deg = 0.0
+            [scene]
+            terrain = { dem = "/maps/dem.tif", ortho = "ortho.tif" }
+            sky = [0.1, 0.2, 0.3]
+            [scene.light]
+            sun_azimuth_deg = 150.0
+            sun_elevation_deg = 35.0
+            [[scene.gltf]]
+            file = "house.glb"
+            placements = "houses.csv"
+            on_ground = true
+            [[scene.gltf]]
+            file = "../tower.glb"
+            geodetic = [46.5, 7.25, 0.0]
+            time_s = 1.5
+            [quality]
+            solver = "rk2"
+            [output]
+            channels = ["color", "coords"]
+        "#;
+        let ours = manifest(parse_scenario(text, Path::new("there/s.toml"), &[]).unwrap());
+        ours.write(dir.path()).unwrap();
+        let run = dir.path().join("run.json");
+        // Paths are those of the working directory, not of the folder that the manifest is in.
+        assert_eq!(ours.scenario.flight.log, Path::new("there/logs/a.csv"));
+        assert_eq!(read_scenario(&run, &[], None).unwrap(), ours.scenario);
+        let sets = [("camera.fps".to_owned(), "12.5".to_owned())];
+        assert_eq!(read_scenario(&run, &sets, None).unwrap().camera.fps, 12.5);
+        for (text, wanted) in [
+            ("{ \"apply\": {} }", "run.json: JSON without `scenario`"),
+            ("{ \"scenario\": ", "run.json: neither TOML nor JSON"),
+            ("{ \"scenario\": { \"fligth\": {} } }", "run.json: fligth: unknown key"),
+        ] {
+            std::fs::write(&run, text).unwrap();
+            let error = read_scenario(&run, &[], None).unwrap_err().to_string();
+            assert!(error.contains(wanted), "{error}");
+        }
     }
 
     #[test]

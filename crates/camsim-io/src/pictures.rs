@@ -36,6 +36,14 @@ impl PictureError {
         Self::Open { path: path.into(), source }
     }
 
+    /// Without the file's name.
+    pub(crate) fn reason(&self) -> String {
+        match self {
+            Self::Open { source, .. } => format!("cannot be read: {source}"),
+            Self::Decode { reason, .. } => format!("cannot be decoded: {reason}"),
+        }
+    }
+
     pub(crate) fn decode(path: &Path, reason: impl Into<String>) -> Self {
         Self::Decode { path: path.into(), reason: reason.into() }
     }
@@ -86,12 +94,21 @@ fn luma([r, g, b]: [f32; 3]) -> f32 {
     if r == g && g == b { r } else { 0.2126 * r + 0.7152 * g + 0.0722 * b }
 }
 
+/// Size of a picture within another file.
+pub(crate) fn size_of_bytes(bytes: &[u8]) -> Result<[u32; 2], String> {
+    if bytes.is_empty() {
+        return Err("it has no bytes".into());
+    }
+    let reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
+    if reader.format().is_none() {
+        return Err("it is none of them".into());
+    }
+    reader.into_dimensions().map(|(width, height)| [width, height]).map_err(|error| error.to_string())
+}
+
 /// A picture within another file.
 pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
     let mut reader = ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format().map_err(|error| error.to_string())?;
-    if reader.format().is_none() {
-        return Err("neither PNG nor JPEG".into());
-    }
     let mut limits = image::Limits::default();
     limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes.len() as u64)));
     reader.limits(limits);

@@ -57,12 +57,12 @@ pub enum ScenarioError {
     Problems(Vec<String>),
 }
 
-/// Reads a scenario, with `sets` (`--set key=value`, in order) and `preset` on top, and checks all of it.
+/// Reads a scenario, or that of a `run.json`, with `sets` (`--set key=value`, in order) and `preset` on top, and checks all of it.
 ///
 /// # Errors
 /// The file or its camera file cannot be read or is not TOML; a key is unknown, of the wrong type or out of range.
 pub fn read_scenario(path: &Path, sets: &[(String, String)], preset: Option<Preset>) -> Result<Scenario, ScenarioError> {
-    finish(Tree::read(path, "")?, sets, preset)
+    finish(Tree::read_scenario(path)?, sets, preset)
 }
 
 /// As [`read_scenario`], from text that stands for the file `path`.

@@ -35,13 +35,16 @@ FRAME.toml (paths relative to it):
   color_channels = [\"R\", \"G\", \"B\"], color_layer; depth_channel = \"Depth.Z\", depth_layer
                                of an EXR with several layers or parts: whole names, or their ends; a name that is not there
                                gets a list of those that are
-  depth = \"depth.exr\"          EXR Z in metres, or 16-bit PNG or PGM with depth_per_metre (0.001 to 1e6), or 8-bit RGB PNG
-                               with depth_encoding = \"packed24\"; positive forward, 0 is unknown or sky: infinitely far
+  depth = \"depth.exr\"          EXR Z, PFM or TIFF of floats in metres, or 16-bit PNG, PGM or TIFF with depth_per_metre (0.001
+                               to 1e6), or 8-bit RGB PNG with depth_encoding = \"packed24\"; positive forward, 0 is unknown or
+                               sky: infinitely far
+  depth_rows = \"bottom-up\"     of a PFM: the row that it begins with | \"top-down\", as AirSim writes them
+  depth_max_m = 1e9            what is stored as that far, or farther, is no depth: the value that stands for the sky
   depth_kind = \"planar\"        | \"range\"
   holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one | \"mark\": what looks
                                there is alpha 0
   focal_px = [307.6, 307.6]    of the ideal picture, which may be larger than the output
-  principal_point_px = [543.5, 407.5]
+  principal_point_px = [543.5, 407.5]   if left out its centre, of an EXR that of the display window
   instant_ms = 0.0             when it was taken, from the stamp
   [motion]                     a twist, constant in camera axes (x right, y down, z forward): a screw, whose velocity turns
                                with the camera ...

@@ -42,10 +42,18 @@ struct Ready {
     place: u32,
 }
 
-/// The places of triangles from behind to the front; `None` where there are too many of them, or of pairs. Corners are in the camera's axes (x right,
-/// y down, z ahead), metres.
+/// An order of triangles.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PaintOrder {
+    /// Their places, from behind to the front.
+    pub places: Vec<u32>,
+    /// Of triangles that cover each other in a ring, those that are drawn before something behind them.
+    pub out_of_order: u32,
+}
+
+/// The order of triangles; `None` where there are too many of them, or of pairs. Corners are in the camera's axes (x right, y down, z ahead), metres.
 #[must_use]
-pub fn back_to_front(triangles: &[[DVec3; 3]]) -> Option<Vec<u32>> {
+pub fn back_to_front(triangles: &[[DVec3; 3]]) -> Option<PaintOrder> {
     if triangles.len() > MOST_TRIANGLES {
         return None;
     }
@@ -79,21 +87,24 @@ pub fn back_to_front(triangles: &[[DVec3; 3]]) -> Option<Vec<u32>> {
 }
 
 /// Takes what nothing is left behind, the farthest first, and where there is no such triangle the farthest of all.
-fn resolved(seen: &[Seen], in_front: &[Vec<u32>], mut behind: Vec<u32>) -> Vec<u32> {
+fn resolved(seen: &[Seen], in_front: &[Vec<u32>], mut behind: Vec<u32>) -> PaintOrder {
     let ready = |place: u32| Ready { distance_m: seen[place as usize].distance_m, place };
     let mut open: BinaryHeap<Ready> = (0..seen.len() as u32).filter(|&place| behind[place as usize] == 0).map(ready).collect();
     let mut from_afar: Vec<u32> = (0..seen.len() as u32).collect();
     from_afar.sort_by_key(|&place| std::cmp::Reverse(ready(place)));
     let mut from_afar = from_afar.into_iter();
     let mut taken = vec![false; seen.len()];
-    let mut order = Vec::with_capacity(seen.len());
-    while order.len() < seen.len() {
-        let next = open.pop().map(|ready| ready.place).or_else(|| from_afar.find(|&place| !taken[place as usize]));
+    let mut order = PaintOrder { places: Vec::with_capacity(seen.len()), out_of_order: 0 };
+    while order.places.len() < seen.len() {
+        let next = open.pop().map(|ready| ready.place).or_else(|| {
+            order.out_of_order += 1;
+            from_afar.find(|&place| !taken[place as usize])
+        });
         let Some(place) = next else { break };
         if std::mem::replace(&mut taken[place as usize], true) {
             continue;
         }
-        order.push(place);
+        order.places.push(place);
         for &other in &in_front[place as usize] {
             behind[other as usize] -= 1;
             if behind[other as usize] == 0 {
@@ -250,10 +261,10 @@ mod tests {
             })
             .collect();
         let order = back_to_front(&triangles).unwrap();
-        let mut all = order.clone();
+        let mut all = order.places.clone();
         all.sort_unstable();
         assert_eq!(all, (0..300).collect::<Vec<_>>(), "each once");
-        assert_eq!(wrong_places(&triangles, &order), 0);
+        assert_eq!((wrong_places(&triangles, &order.places), order.out_of_order), (0, 0));
         let naive = wrong_places(&triangles, &by_distance(&triangles));
         assert!(naive > 10, "distance alone would not do: {naive}");
     }
@@ -267,9 +278,9 @@ mod tests {
         // Seen from the middle of the large one, whose middle is nearer.
         let triangles = [pane(12.0, 1.0, 9.0), pane(0.0, 30.0, 10.0)];
         assert!(triangles[0].iter().sum::<DVec3>().length() > triangles[1].iter().sum::<DVec3>().length());
-        assert_eq!(back_to_front(&triangles).unwrap(), [1, 0]);
+        assert_eq!(back_to_front(&triangles).unwrap().places, [1, 0]);
         let behind = [pane(12.0, 1.0, 11.0), pane(0.0, 30.0, 10.0)];
-        assert_eq!(back_to_front(&behind).unwrap(), [0, 1]);
+        assert_eq!(back_to_front(&behind).unwrap(), PaintOrder { places: vec![0, 1], out_of_order: 0 });
     }
 
     #[test]
@@ -295,7 +306,7 @@ mod tests {
             };
             meshes.iter().flat_map(of).collect()
         };
-        let wrong = |triangles: &[[DVec3; 3]]| wrong_places(triangles, &back_to_front(triangles).unwrap());
+        let wrong = |triangles: &[[DVec3; 3]]| wrong_places(triangles, &back_to_front(triangles).unwrap().places);
         let area = |triangles: &[[DVec3; 3]]| triangles.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a).length()).sum::<f64>();
         let before = corners(&meshes);
         let done = cut_where_blended_cross(&mut meshes);
@@ -304,6 +315,9 @@ mod tests {
         assert_eq!((after.len() - before.len(), 0), (done.more, done.left));
         assert!(done.more > 100 && after.len() < 20 * before.len(), "{done:?}");
         assert!((area(&after) / area(&before) - 1.0).abs() < 1e-5, "nothing is lost");
+        // They are counted: a few of all.
+        let out_of_order = back_to_front(&after).unwrap().out_of_order;
+        assert!(out_of_order > 0 && (out_of_order as usize) < after.len() / 4, "{out_of_order} of {}", after.len());
         assert!(wrong(&before) > 100 && wrong(&after) < wrong(&before) / 4, "{} {}", wrong(&before), wrong(&after));
         // What is left are rings: of each two by themselves the order is right.
         let unlike = |triangles: &[[DVec3; 3]]| {
@@ -333,10 +347,12 @@ mod tests {
         let mut triangles =
             vec![bar(0.0), bar(1.0), bar(2.0), across, across.map(|at| DVec3::new(-at.x, at.y, at.z)), across.map(|at| -at)];
         triangles.extend([[DVec3::ZERO; 3], [DVec3::NAN; 3], [DVec3::INFINITY; 3], [DVec3::Z; 3]]);
+        assert_eq!(back_to_front(&triangles[..3]).unwrap().out_of_order, 1);
+        assert_eq!(back_to_front(&triangles[..2]).unwrap().out_of_order, 0);
         let mut order = back_to_front(&triangles).unwrap();
-        order.sort_unstable();
-        assert_eq!(order, (0..10).collect::<Vec<_>>());
+        order.places.sort_unstable();
+        assert_eq!(order.places, (0..10).collect::<Vec<_>>());
         assert_eq!(back_to_front(&vec![across; MOST_TRIANGLES + 1]), None);
-        assert_eq!(back_to_front(&[]), Some(Vec::new()));
+        assert_eq!(back_to_front(&[]), Some(PaintOrder::default()));
     }
 }

@@ -30,6 +30,8 @@ pub struct Finished {
     pub plan: FramePlan,
     /// The terrain's level of detail.
     pub lod: LodSelection,
+    /// Blended triangles that are mixed before something behind them, since they cover each other in rings; of all ideal frames.
+    pub out_of_order: u32,
     /// Where its time went.
     pub times: FrameTimes,
 }

@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use camsim_core::{pose::CameraPose, scene::paint_order::back_to_front};
+use camsim_core::{
+    pose::CameraPose,
+    scene::paint_order::{PaintOrder, back_to_front},
+};
 use glam::{DMat3, DVec2, DVec3};
 
 use super::{IdealSlot, pipelines::SurfacePipelines, surfaces::index_buffer};
@@ -19,6 +22,8 @@ const FEWER_TRIANGLES: &str = "have fewer triangles with alphaMode BLEND, or mak
 pub(super) struct Ordered {
     indices: wgpu::Buffer,
     draws: Vec<Draw>,
+    /// Triangles in rings that are drawn before something behind them.
+    pub out_of_order: u32,
 }
 
 /// Triangles of one mesh that follow each other.
@@ -40,7 +45,7 @@ struct Triangle {
 
 impl Ordered {
     pub fn new(gpu: &GpuContext) -> Self {
-        Self { indices: index_buffer(gpu, 0), draws: Vec::new() }
+        Self { indices: index_buffer(gpu, 0), draws: Vec::new(), out_of_order: 0 }
     }
 
     /// Finds and writes the order. `drawn` says which placements are drawn of each batch, `seen` whose those are.
@@ -67,9 +72,10 @@ impl Ordered {
             }
         }
         let places: Vec<[DVec3; 3]> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
-        let order = back_to_front(&places).unwrap_or_else(|| mesh_by_mesh(&triangles));
-        self.draws = runs(&triangles, &order);
-        let indices: Vec<u32> = order.iter().flat_map(|&k| triangles[k as usize].corners).collect();
+        let order = back_to_front(&places).unwrap_or_else(|| PaintOrder { places: mesh_by_mesh(&triangles), out_of_order: 0 });
+        self.out_of_order = order.out_of_order;
+        self.draws = runs(&triangles, &order.places);
+        let indices: Vec<u32> = order.places.iter().flat_map(|&k| triangles[k as usize].corners).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&indices);
         gpu.check_storage("the triangles that one frame mixes with what is behind them", bytes.len() as u64, FEWER_TRIANGLES)?;
         if self.indices.size() < bytes.len() as u64 {
@@ -184,7 +190,7 @@ mod tests {
         assert_eq!(draws, [Draw { batch: 1, placement: 4, indices: 0..6 }, Draw { batch: 0, placement: 3, indices: 6..12 }]);
         // With an order of their own they take turns.
         let places: Vec<_> = triangles.iter().map(|triangle| triangle.in_camera_m).collect();
-        let order = back_to_front(&places).expect("few");
+        let order = back_to_front(&places).expect("few").places;
         assert_eq!(order, [3, 2, 1, 0]);
         assert_eq!(runs(&triangles, &order).len(), 4);
     }

@@ -9,6 +9,7 @@ use image::{DynamicImage, ImageFormat};
 use super::{
     DepthEncoding, DepthKind, FrameFileError, FrameSpec,
     exr_planes::read_exr,
+    floats::{self, Stored},
     images::{failure, is_exr, open},
 };
 
@@ -19,6 +20,9 @@ const PER_METRE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 /// No camera sees anything nearer, metres. Its inverse and the slant of any ray fit an f32.
 const NEAREST_M: f64 = 1e-6;
 
+/// What is at least as far is no depth, metres, unless `depth_max_m` says less: no scene is as large, and Blender's background is 1e10.
+const FARTHEST_M: f64 = 1e9;
+
 /// 1/z in 1/m, 0 where there is no depth.
 pub(super) fn read_inverse_depth(
     path: &Path,
@@ -27,54 +31,8 @@ pub(super) fn read_inverse_depth(
     color_origin_px: Option<[i32; 2]>,
     frame_path: &Path,
 ) -> Result<Vec<f32>, FrameFileError> {
-    let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
-    let packed = spec.depth_encoding == DepthEncoding::Packed24;
-    let (size_px, values, whole) = if is_exr(path) {
-        if packed {
-            return Err(fail(
-                "depth_encoding",
-                "\"packed24\" is of 8-bit RGB pictures, and depth is an EXR, whose Z is in metres; leave it out",
-            ));
-        }
-        let picture = read_exr(path)?;
-        let plane = picture.depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref()).map_err(|message| failure(path, message))?;
-        if color_origin_px.is_some_and(|origin_px| origin_px != plane.origin_px) {
-            let message = format!(
-                "{}: begins at pixel {:?} of its file, the colour elsewhere: they must cover the same pixels",
-                plane.name, plane.origin_px
-            );
-            return Err(failure(path, message));
-        }
-        (plane.size_px, plane.values.iter().map(|&z| f64::from(z)).collect(), false)
-    } else {
-        if let Some(key) = spec.depth_key() {
-            return Err(fail(key, "is for EXR, and depth is none; leave it out"));
-        }
-        let (picture, format) = open(path)?;
-        if packed && !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
-            let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
-            return Err(failure(path, message));
-        }
-        let size_px = [picture.width(), picture.height()];
-        if packed { (size_px, packed24(&picture, path)?, false) } else { (size_px, whole_numbers(&picture, path)?, true) }
-    };
-    let per_metre = match (spec.depth_per_metre, whole) {
-        (Some(per_metre), true) if PER_METRE.contains(&per_metre) => per_metre,
-        (Some(_), true) => {
-            let message = "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM";
-            return Err(fail("depth_per_metre", message));
-        }
-        (Some(_), false) => {
-            return Err(fail("depth_per_metre", "is for 16-bit PNG and PGM; EXR and packed24 are in metres: leave it out"));
-        }
-        (None, false) => 1.0,
-        (None, true) => {
-            return Err(fail(
-                "depth_per_metre",
-                "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
-            ));
-        }
-    };
+    let Stored { size_px, values, whole } = stored(path, spec, color_origin_px, frame_path)?;
+    let per_metre = per_metre(spec.depth_per_metre, whole, frame_path)?;
     if size_px != geometry.size_px {
         let [w, h] = geometry.size_px;
         return Err(failure(
@@ -83,6 +41,7 @@ pub(super) fn read_inverse_depth(
         ));
     }
     refuse_without_any(&values, per_metre, path)?;
+    let most_m = spec.depth_max_m.unwrap_or(FARTHEST_M).min(FARTHEST_M);
     let planar = |(i, value): (usize, f64)| {
         let depth_m = value / per_metre;
         let pixel = DVec2::new((i as u32 % size_px[0]).into(), (i as u32 / size_px[0]).into());
@@ -91,9 +50,57 @@ pub(super) fn read_inverse_depth(
             DepthKind::Range => ((pixel - geometry.principal_px) / geometry.focal_px).extend(1.0).length(),
         };
         let inverse = slant / depth_m;
-        if usable(depth_m) { inverse as f32 } else { 0.0 }
+        if usable(depth_m) && depth_m < most_m { inverse as f32 } else { 0.0 }
     };
     Ok(values.into_iter().enumerate().map(planar).collect())
+}
+
+/// The numbers of a depth picture, in whatever kind of file.
+fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, frame_path: &Path) -> Result<Stored, FrameFileError> {
+    let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
+    let packed = spec.depth_encoding == DepthEncoding::Packed24;
+    let exr = is_exr(path);
+    if let (false, Some(key)) = (exr, spec.depth_key()) {
+        return Err(fail(key, "is for EXR, and depth is none; leave it out"));
+    }
+    let floats = if exr { Some(read_exr_depth(path, spec, color_origin_px)?) } else { floats::read(path, spec.depth_rows, frame_path)? };
+    if let Some(found) = floats {
+        let message = "\"packed24\" is of 8-bit RGB pictures, and depth is an EXR, PFM or TIFF; leave it out";
+        return if packed { Err(fail("depth_encoding", message)) } else { Ok(found) };
+    }
+    let (picture, format) = open(path)?;
+    if packed && !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
+        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
+        return Err(failure(path, message));
+    }
+    let size_px = [picture.width(), picture.height()];
+    let values = if packed { packed24(&picture, path)? } else { whole_numbers(&picture, path)? };
+    Ok(Stored { size_px, values, whole: !packed })
+}
+
+fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>) -> Result<Stored, FrameFileError> {
+    let picture = read_exr(path)?;
+    let plane = picture.depth(spec.depth_channel.as_deref(), spec.depth_layer.as_deref()).map_err(|message| failure(path, message))?;
+    if color_origin_px.is_some_and(|origin_px| origin_px != plane.origin_px) {
+        let message = format!(
+            "{}: begins at pixel {:?} of its file, the colour elsewhere: they must cover the same pixels",
+            plane.name, plane.origin_px
+        );
+        return Err(failure(path, message));
+    }
+    Ok(Stored { size_px: plane.size_px, values: plane.values.iter().map(|&z| f64::from(z)).collect(), whole: false })
+}
+
+/// Stored value of one metre.
+fn per_metre(given: Option<f64>, whole: bool, frame_path: &Path) -> Result<f64, FrameFileError> {
+    let message = match (given, whole) {
+        (Some(per_metre), true) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
+        (None, false) => return Ok(1.0),
+        (Some(_), true) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
+        (Some(_), false) => "is for whole numbers (PNG, PGM, TIFF); EXR, PFM, TIFF of floats and packed24 are in metres: leave it out",
+        (None, true) => "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
+    };
+    Err(FrameFileError::Key { path: frame_path.into(), key: "depth_per_metre", message: message.to_owned() })
 }
 
 /// Nothing is nearer than [`NEAREST_M`]; what claims to be is no measurement either.
@@ -149,7 +156,10 @@ fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(),
 fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
     match picture {
         DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
-        _ => Err(failure(path, "is no 16-bit grey picture: give depth as 16-bit PNG or PGM, as EXR, or set depth_encoding = \"packed24\"")),
+        _ => Err(failure(
+            path,
+            "is no 16-bit grey picture: give depth as 16-bit PNG, PGM or TIFF, as EXR, PFM or TIFF of floats, or set depth_encoding = \"packed24\"",
+        )),
     }
 }
 

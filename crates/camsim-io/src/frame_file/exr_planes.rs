@@ -25,16 +25,30 @@ impl Plane {
     }
 }
 
+/// Layers of Blender's whose Z is not in metres.
+const NO_DEPTH: [&str; 2] = ["Mist", "Denoising Depth"];
+
 /// All planes of a file.
 pub(super) struct Planes {
     pub(super) planes: Vec<Plane>,
+    /// Middle of the display window, in the file's own pixels: where the optical axis is, whatever part of the picture the file holds.
+    pub(super) display_centre_px: [f64; 2],
 }
 
 /// Reads every part.
 pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
-    let image = read_all_flat_layers_from_file(path)
-        .map_err(|error| failure(path, format!("cannot be read as EXR: {error}; paths are relative to FRAME.toml")))?;
+    let image = read_all_flat_layers_from_file(path).map_err(|error| {
+        let fix = match &error {
+            exr::error::Error::NotSupported(_) => "write it with ZIP compression, and not deep",
+            exr::error::Error::Io(_) => "paths are relative to FRAME.toml",
+            _ => "it is cut off, or no EXR",
+        };
+        failure(path, format!("cannot be read as EXR: {error}; {fix}"))
+    })?;
     let several = image.layer_data.len() > 1;
+    let display = image.attributes.display_window;
+    let middle = |from: i32, length: usize| f64::from(from) + 0.5 * (length as f64 - 1.0);
+    let display_centre_px = [middle(display.position.0, display.size.0), middle(display.position.1, display.size.1)];
     let mut planes = Vec::new();
     for part in &image.layer_data {
         let part_name = part.attributes.layer_name.as_ref().filter(|_| several).map(ToString::to_string).unwrap_or_default();
@@ -49,7 +63,7 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
             });
         }
     }
-    Ok(Planes { planes })
+    Ok(Planes { planes, display_centre_px })
 }
 
 impl Planes {
@@ -145,8 +159,12 @@ impl Planes {
             let layer = plane.layer_and_channel().0;
             self.planes.iter().any(|plane| plane.layer_and_channel() == (layer, other))
         };
-        // A Z beside an X is a coordinate. Blender's depth pass is called `Depth.V` when it has a file of its own.
-        let is = |plane: &&Plane, channel: &str, not_beside: &str| plane.layer_and_channel().1 == channel && !beside(plane, not_beside);
+        // A Z beside an X is a coordinate. Blender's depth pass is called `Depth.V` when it has a file of its own; its mist is a Z too, and
+        // no depth.
+        let is = |plane: &&Plane, channel: &str, not_beside: &str| {
+            let (layer, name) = plane.layer_and_channel();
+            name == channel && !beside(plane, not_beside) && !NO_DEPTH.contains(&last(layer))
+        };
         let mut found: Vec<&Plane> = self.planes.iter().filter(|plane| is(plane, "Z", "X")).collect();
         if found.is_empty() {
             found = self.planes.iter().filter(|plane| is(plane, "V", "U")).collect();

@@ -17,6 +17,8 @@ pub(super) const FRAME: Schema = Schema {
         ("depth_layer", Text),
         ("depth_encoding", Word(&["plain", "packed24"])),
         ("depth_per_metre", Number),
+        ("depth_rows", Word(&["top-down", "bottom-up"])),
+        ("depth_max_m", Number),
         ("depth_kind", Word(&["planar", "range"])),
         ("holes", Word(&["far", "nearest", "mark"])),
         ("focal_px", Numbers(2)),

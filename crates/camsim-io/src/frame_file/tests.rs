@@ -76,7 +76,7 @@ fn depth_is_read_from_exr_and_packed_bytes() {
     // What `apply` writes is what it reads: linear values beyond 1 and all.
     write_picture(&folder.path().join("out.exr"), &frame, OutputEncoding::Srgb8).unwrap();
     let file = read_frame(&path).unwrap();
-    assert_eq!(file.frame.inverse_depth, [1.0, 0.0, 0.25, 1e-10, 0.0, 0.0]);
+    assert_eq!(file.frame.inverse_depth, [1.0, 0.0, 0.25, 0.0, 0.0, 0.0]);
     assert_eq!(file.frame.color_rgba[..3], color_rgba[..3]);
     let error = write_picture(&folder.path().join("out.tga"), &frame, OutputEncoding::Srgb8).unwrap_err().to_string();
     assert!(error.contains(".exr or .png"), "{error}");
@@ -115,12 +115,12 @@ fn depth_that_means_nothing_is_refused_and_sky_is_not() {
     let of_exr = "color = \"c.png\"\ndepth = \"z.exr\"\nfocal_px = [2, 2]\n";
     for (text, expected) in [
         (format!("{of_exr}depth_encoding = \"packed24\"\n"), "FRAME.toml: depth_encoding: \"packed24\" is of 8-bit RGB pictures"),
-        (format!("{of_exr}depth_per_metre = 1000\n"), "depth_per_metre: is for 16-bit PNG and PGM"),
+        (format!("{of_exr}depth_per_metre = 1000\n"), "depth_per_metre: is for whole numbers"),
         (GOOD.replace("1000", "1e-300"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "1e300"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "nan"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("depth_per_metre = 1000", "depth_encoding = \"packed24\""), "d.png: is no 8-bit RGB picture"),
-        (format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"), "depth_per_metre: is for 16-bit PNG and PGM"),
+        (format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"), "depth_per_metre: is for whole numbers"),
     ] {
         fs::write(&path, &text).unwrap();
         let error = read_frame(&path).unwrap_err().to_string();

@@ -50,6 +50,13 @@ pub(super) struct Materials<'a> {
     pub notes: Vec<String>,
 }
 
+/// No adapter takes a larger side.
+const LARGEST_PX: u32 = 32_768;
+/// What adapters take at least, but for small ones.
+const COMMON_PX: u32 = 16_384;
+/// What is larger fills a device: a third of a gigabyte.
+const LARGE_PX: u64 = 1 << 26;
+
 impl<'a> Materials<'a> {
     pub fn new(source: &'a Source) -> Self {
         let white = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
@@ -202,8 +209,20 @@ impl<'a> Materials<'a> {
             return Ok(texture.clone());
         }
         let bytes = self.source.image(image)?;
-        let wrong = |reason: String| self.source.broken(format!("images.{}: cannot be decoded: {reason}", image.index()));
-        let decoded = crate::pictures::decode_bytes(&bytes).map_err(wrong)?;
+        let number = image.index();
+        let wrong = |reason: String| self.source.broken(format!("images.{number}: {reason}"));
+        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG or JPEG: {reason}; write it as one of them"));
+        let [width, height] = crate::pictures::size_of_bytes(&bytes).map_err(undecoded)?;
+        if width.max(height) > LARGEST_PX {
+            return Err(wrong(format!("is of {width}x{height} px, and at most {LARGEST_PX} on a side can be shown: make it smaller")));
+        }
+        if width.max(height) > COMMON_PX || u64::from(width) * u64::from(height) > LARGE_PX {
+            let mib = (u64::from(width) * u64::from(height) * 16 / 3).div_ceil(1 << 20);
+            let sides = format!("many adapters take at most {COMMON_PX} on a side");
+            self.notes
+                .push(format!("images.{number}: is of {width}x{height} px, {mib} MiB of the device's memory: {sides}; smaller may do"));
+        }
+        let decoded = crate::pictures::decode_bytes(&bytes).map_err(undecoded)?;
         let size_px = [decoded.width(), decoded.height()];
         let mut texture = Texture { size_px, rgba8: decoded.into_rgba8().into_raw(), encoding: Encoding::Srgb };
         if has_alpha {
@@ -219,6 +238,11 @@ impl<'a> Materials<'a> {
 }
 
 impl UvRule {
+    /// Whether there is a picture that coordinates matter for.
+    pub fn has_picture(&self) -> bool {
+        self.scale != [0.0; 2]
+    }
+
     /// Texture coordinates of the picture.
     pub fn apply(&self, [u, v]: [f64; 2]) -> [f32; 2] {
         let (sin, cos) = self.rotation.sin_cos();

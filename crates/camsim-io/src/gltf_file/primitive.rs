@@ -7,7 +7,11 @@ use std::{
 
 use camsim_core::scene::{MeshVertex, Shape, light::turned_normal};
 use glam::{DAffine3, DMat3, DVec3};
-use gltf::{Semantic, mesh::Mode};
+use gltf::{
+    Semantic,
+    accessor::{DataType, Dimensions::*},
+    mesh::Mode,
+};
 
 use super::{GltfError, accessor, material::UvRule, normals, source::Source};
 
@@ -27,6 +31,10 @@ pub(super) fn triangle_mode(mode: Mode) -> Option<Triangles> {
         Mode::TriangleFan => Some(Triangles::Fan),
         _ => None,
     }
+}
+
+fn is_index(accessor: &gltf::Accessor<'_>) -> bool {
+    accessor.dimensions() == Scalar && matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32)
 }
 
 /// What a primitive becomes a shape by.
@@ -52,6 +60,7 @@ impl Making<'_> {
         let count = positions.len();
         let of = |semantic: &Semantic| -> Result<Option<Vec<[f64; 4]>>, GltfError> {
             let Some(accessor) = primitive.get(semantic) else { return Ok(None) };
+            self.check(primitive, semantic, &accessor)?;
             let rows = accessor::rows(self.source, &accessor)?;
             if rows.len() == count {
                 Ok(Some(rows))
@@ -61,8 +70,7 @@ impl Making<'_> {
         };
         let uvs = of(&Semantic::TexCoords(self.uv.set))?;
         let colors = if self.uv.vertex_colors { of(&Semantic::Colors(0))? } else { None };
-        let with_alpha =
-            primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == gltf::accessor::Dimensions::Vec4);
+        let with_alpha = primitive.get(&Semantic::Colors(0)).is_some_and(|accessor| accessor.dimensions() == Vec4);
         let vertex = |(i, position): (usize, &DVec3)| {
             let [u, v] = uvs.as_ref().map_or([0.0; 2], |rows| [rows[i][0], rows[i][1]]);
             let [r, g, b, a] = colors.as_ref().map_or([1.0; 4], |rows| rows[i]);
@@ -92,6 +100,7 @@ impl Making<'_> {
     /// The file's own normals, of any length.
     fn given_normals(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Option<Vec<DVec3>>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };
+        self.check(primitive, &Semantic::Normals, &accessor)?;
         let mut normals = self.morphed(primitive, &accessor, |target| target.normals())?;
         if normals.len() != count {
             return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
@@ -125,12 +134,27 @@ impl Making<'_> {
         Ok(vectors)
     }
 
+    /// Refuses what is not of as many numbers as its meaning has.
+    fn check(&self, primitive: &gltf::Primitive<'_>, semantic: &Semantic, accessor: &gltf::Accessor<'_>) -> Result<(), GltfError> {
+        let found = accessor.dimensions();
+        let fits = match semantic {
+            Semantic::Positions | Semantic::Normals => found == Vec3,
+            Semantic::TexCoords(_) => found == Vec2,
+            Semantic::Colors(_) => matches!(found, Vec3 | Vec4),
+            _ => found == Vec4,
+        };
+        let number = accessor.index();
+        let message = || format!("accessors.{number} is of {found:?}, which is nothing for {}", semantic.to_string());
+        if fits { Ok(()) } else { Err(self.wrong(primitive, &message())) }
+    }
+
     fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
         self.source.broken(format!("a mesh's primitive {}: {message}", primitive.index()))
     }
 
     fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Positions) else { return Ok(Vec::new()) };
+        self.check(primitive, &Semantic::Positions, &accessor)?;
         let mut positions = self.morphed(primitive, &accessor, |target| target.positions())?;
         if let Some(joints) = self.joints {
             self.bend(primitive, joints, &mut positions)?;
@@ -165,6 +189,8 @@ impl Making<'_> {
         let mut bent = vec![(zero, 0.0); count];
         for set in 0.. {
             let (Some(of), Some(by)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set))) else { break };
+            self.check(primitive, &Semantic::Joints(set), &of)?;
+            self.check(primitive, &Semantic::Weights(set), &by)?;
             let (of, by) = (accessor::rows(self.source, &of)?, accessor::rows(self.source, &by)?);
             if of.len() != count || by.len() != count {
                 return Err(self.wrong(primitive, "its joints or weights have another number of elements"));
@@ -183,6 +209,13 @@ impl Making<'_> {
     fn indices(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Vec<u32>, GltfError> {
         let all: Vec<u32> = match primitive.indices() {
             None => (0..count as u32).collect(),
+            Some(accessor) if !is_index(&accessor) => {
+                let (number, kind, many) = (accessor.index(), accessor.data_type(), accessor.dimensions());
+                return Err(self.wrong(
+                    primitive,
+                    &format!("accessors.{number} is of {many:?} of {kind:?}: indices are whole numbers from 0, one each"),
+                ));
+            }
             Some(accessor) => accessor::numbers(self.source, &accessor)?.into_iter().map(|index| index as u32).collect(),
         };
         if let Some(index) = all.iter().find(|&&index| index as usize >= count) {

@@ -5,12 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde_json::Value;
 
-use super::{GltfError, accessor};
-
-/// Extensions that a file may require: what they add is done here, or by the glTF crate.
-const DONE: &[&str] = &["KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_texture_transform", "KHR_materials_unlit"];
-/// Extensions that only change light and shade, which are not shown.
-const NO_MATTER: &[&str] = &["KHR_materials_", "KHR_lights_punctual", "KHR_animation_pointer"];
+use super::{GltfError, accessor, checks};
 
 /// A file with everything that it needs.
 #[derive(Debug)]
@@ -25,19 +20,21 @@ impl Source {
     pub fn read(path: &Path) -> Result<Self, GltfError> {
         let bytes = read_file(path)?;
         let broken = |message: String| GltfError::Broken { path: path.into(), message };
+        if bytes.is_empty() {
+            return Err(broken("is empty".into()));
+        }
         let (text, blob) = if bytes.starts_with(b"glTF") { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
+        // A byte order mark is not allowed, and editors write it nevertheless.
+        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
         let mut json: Value = serde_json::from_slice(text).map_err(|error| broken(format!("is no glTF: {error}")))?;
-        check_extensions(path, &json)?;
+        checks::check_extensions(path, &json)?;
         if let Some(root) = json.as_object_mut() {
             root.remove("extensionsRequired");
         }
-        let version = json.pointer("/asset/version").and_then(Value::as_str).unwrap_or_default();
-        if !version.starts_with("2.") {
-            return Err(broken(format!("is glTF of version `{version}`, not 2.0: convert it")));
-        }
-        check_positions(&json).map_err(broken)?;
+        checks::check_version(&json).map_err(broken)?;
+        checks::check_numbers(&json).map_err(broken)?;
         let root = serde_json::from_value(json.clone()).map_err(|error| broken(format!("is no glTF 2.0: {error}")))?;
-        let document = gltf::Document::from_json(root).map_err(|error| broken(format!("is not valid: {error}")))?;
+        let document = gltf::Document::from_json(root).map_err(|error| broken(checks::in_words(error)))?;
         let mut buffers = Vec::new();
         for buffer in document.buffers() {
             let mut bytes = match buffer.source() {
@@ -103,38 +100,6 @@ impl Source {
     }
 }
 
-fn check_extensions(path: &Path, json: &Value) -> Result<(), GltfError> {
-    let required = json.get("extensionsRequired").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str);
-    for name in required {
-        if DONE.contains(&name) || NO_MATTER.iter().any(|known| name.starts_with(known)) {
-            continue;
-        }
-        let fix = match name {
-            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-                "write the file again without compression"
-            }
-            "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" => "write its pictures as PNG or JPEG",
-            _ => "write the file again without it",
-        };
-        return Err(GltfError::Extension { path: path.into(), extension: name.into(), fix });
-    }
-    Ok(())
-}
-
-/// The glTF crate's own check looks at these accessors before it knows that they are there.
-fn check_positions(json: &Value) -> Result<(), String> {
-    let count = json.get("accessors").and_then(Value::as_array).map_or(0, Vec::len) as u64;
-    let list = |value: &Value, key: &str| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default();
-    for (i, mesh) in list(json, "meshes").iter().enumerate() {
-        for (k, primitive) in list(mesh, "primitives").iter().enumerate() {
-            if let Some(index) = primitive.pointer("/attributes/POSITION").and_then(Value::as_u64).filter(|&index| index >= count) {
-                return Err(format!("meshes.{i}.primitives.{k}: POSITION names accessor {index}, but there are {count}"));
-            }
-        }
-    }
-    Ok(())
-}
-
 /// JSON and, if there is one, the binary part of a .glb file.
 fn split_glb(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -176,8 +141,9 @@ fn fetch(path: &Path, uri: &str, key: &str) -> Result<Vec<u8>, GltfError> {
     if uri.contains("://") {
         return Err(broken("lies on another machine: put it beside the file"));
     }
-    let name = percent_decoded(uri).ok_or_else(|| broken("its name is no text"))?;
-    read_file(&path.with_file_name("").join(name))
+    let name = percent_decoded(uri).filter(|name| !name.is_empty()).ok_or_else(|| broken("its uri is no name of a file"))?;
+    let beside = path.with_file_name("").join(name);
+    std::fs::read(&beside).map_err(|error| broken(&format!("its file {} cannot be read: {error}; put it there", beside.display())))
 }
 
 fn base64(text: &[u8]) -> Option<Vec<u8>> {

@@ -5,6 +5,8 @@ use glam::DVec2;
 
 use super::*;
 
+mod malformed;
+
 fn data() -> Option<PathBuf> {
     let found = std::env::var_os("CAMSIM_DATA").map(|data| PathBuf::from(data).join("gltf"));
     if found.is_none() {

@@ -20,6 +20,8 @@ pub(crate) enum Place {
     File(PathBuf, usize),
     /// `--set key=value`.
     Set(String),
+    /// A run.json.
+    Run(PathBuf),
 }
 
 impl fmt::Display for Place {
@@ -27,6 +29,7 @@ impl fmt::Display for Place {
         match self {
             Self::File(file, line) => write!(f, "{}:{line}", file.display()),
             Self::Set(text) => write!(f, "--set {text}"),
+            Self::Run(file) => write!(f, "{}", file.display()),
         }
     }
 }
@@ -45,6 +48,26 @@ impl Tree {
         let not_text = |error: std::str::Utf8Error| ScenarioError::NotText { path: path.into(), offset: error.valid_up_to() };
         let text = std::str::from_utf8(&bytes).map_err(not_text)?;
         Self::parse(text.strip_prefix('\u{feff}').unwrap_or(text), path, prefix)
+    }
+
+    /// Reads a scenario, or the one that a `run.json` holds: whose paths are those of the working directory, as they were.
+    pub(crate) fn read_scenario(path: &Path) -> Result<Self, ScenarioError> {
+        let begins = std::fs::read(path).ok().and_then(|bytes| bytes.trim_ascii_start().first().copied());
+        // No TOML file begins so.
+        if begins == Some(b'{') { Self::read_run(path) } else { Self::read(path, "") }
+    }
+
+    fn read_run(path: &Path) -> Result<Self, ScenarioError> {
+        let wrong = |message: String| ScenarioError::Problems(vec![format!("{}: {message}", path.display())]);
+        let bytes = std::fs::read(path).map_err(|source| ScenarioError::Read { path: path.into(), source })?;
+        let run: serde_json::Value = serde_json::from_slice(&bytes).map_err(|error| wrong(format!("neither TOML nor JSON: {error}")))?;
+        let Some(Value::Table(root)) = run.get("scenario").and_then(from_json) else {
+            return Err(wrong(
+                "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds a scenario".into(),
+            ));
+        };
+        let places = root.keys().map(|key| (key.clone(), Place::Run(path.into()))).collect();
+        Ok(Self { file: path.into(), root, places })
     }
 
     /// Reads a camera file, whose keys are placed under `camera`. A scenario, or `[camera]` copied with its header, is refused as a whole.
@@ -111,7 +134,7 @@ impl Tree {
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
         match self.place(key) {
             Place::File(file, _) => file.parent().unwrap_or(Path::new("")).join(path),
-            Place::Set(_) => path.into(),
+            Place::Set(_) | Place::Run(_) => path.into(),
         }
     }
 
@@ -145,6 +168,19 @@ impl Tree {
         self.places.insert(key.into(), Place::Set(shown));
         if key == "camera" { self.resolve_camera() } else { Ok(()) }
     }
+}
+
+/// JSON as TOML, in which null is nothing.
+fn from_json(json: &serde_json::Value) -> Option<Value> {
+    use serde_json::Value as Json;
+    Some(match json {
+        Json::Null => return None,
+        Json::Bool(value) => Value::Boolean(*value),
+        Json::Number(number) => number.as_i64().map(Value::Integer).or_else(|| number.as_f64().map(Value::Float))?,
+        Json::String(text) => Value::String(text.clone()),
+        Json::Array(list) => Value::Array(list.iter().filter_map(from_json).collect()),
+        Json::Object(map) => Value::Table(map.iter().filter_map(|(key, value)| Some((key.clone(), from_json(value)?))).collect()),
+    })
 }
 
 /// A TOML value; what is none is a string, so that words need no quotes.

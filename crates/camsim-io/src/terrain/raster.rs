@@ -111,6 +111,15 @@ impl Raster {
         self.bands
     }
 
+    /// Of a depth picture: whether it holds 16-bit whole numbers, or floats; `None` if neither, or of several bands.
+    pub fn depth_is_whole(&self) -> Option<bool> {
+        match (&self.data, self.bands) {
+            (DecodingResult::U16(_), 1) => Some(true),
+            (DecodingResult::F16(_) | DecodingResult::F32(_) | DecodingResult::F64(_), 1) => Some(false),
+            _ => None,
+        }
+    }
+
     /// A value of the first band.
     pub fn value(&self, pixel: usize) -> f64 {
         let at = if self.is_planar { pixel } else { pixel * self.bands };

@@ -1,8 +1,10 @@
 //! A file is written whole or not at all.
 
 use std::{
+    collections::{HashMap, HashSet},
+    ffi::{OsStr, OsString},
     fs, io,
-    path::Path,
+    path::{Path, PathBuf},
     sync::atomic::{AtomicU64, Ordering},
 };
 
@@ -27,4 +29,48 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
         let _ = fs::remove_file(&temporary);
         fail(source)
     })
+}
+
+/// Removes what killed runs left of these files: temporary names that nobody will rename. Whoever else writes below the folder writes other files.
+pub(super) fn sweep(paths: impl Iterator<Item = PathBuf>) {
+    let mut by_folder: HashMap<PathBuf, HashSet<OsString>> = HashMap::new();
+    for path in paths {
+        if let (Some(folder), Some(name)) = (path.parent(), path.file_name()) {
+            by_folder.entry(folder.into()).or_default().insert(name.into());
+        }
+    }
+    for (folder, names) in by_folder {
+        // A folder that is not there has nothing to sweep; litter that cannot be removed stays litter.
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.file_name().to_str().and_then(meant).is_some_and(|name| names.contains(OsStr::new(name))) {
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+/// The name that a temporary one stands for.
+fn meant(temporary: &str) -> Option<&str> {
+    let (name, unique) = temporary.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    let (process, count) = unique.split_once('-')?;
+    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    (is_number(process) && is_number(count)).then_some(name)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn only_leftovers_of_these_files_go() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let stay = ["a.exr", ".b.exr.12-0.tmp", ".a.exr.tmp", ".a.exr.12-.tmp", ".a.exr.x-1.tmp", "a.exr.12-0.tmp", ".a.exr.12-0"];
+        let go = [".a.exr.12-0.tmp", ".a.exr.4711-38.tmp"];
+        stay.iter().chain(&go).for_each(|name| fs::write(at(name), "x").unwrap());
+        sweep([at("a.exr"), at("none/c.exr")].into_iter());
+        assert!(stay.iter().all(|name| at(name).is_file()) && go.iter().all(|name| !at(name).exists()));
+    }
 }

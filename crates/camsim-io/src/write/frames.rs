@@ -15,7 +15,7 @@ use camsim_core::{
     scenario::{Channel, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
 };
 
-use super::{WriteError, exr_file, png_file, tables, write_atomic};
+use super::{WriteError, atomic, exr_file, png_file, tables, write_atomic};
 
 /// Which files a frame has, and where.
 #[derive(Clone, Debug)]
@@ -50,6 +50,12 @@ impl FrameFiles {
     pub fn exist(&self, index: u64) -> bool {
         let names = self.names(index);
         !names.is_empty() && names.iter().all(|(_, name)| self.folder.join(name).is_file())
+    }
+
+    /// Removes what a killed run left half written of these frames' files.
+    pub fn sweep(&self, frames: &[u64]) {
+        let names = frames.iter().flat_map(|&index| self.names(index));
+        atomic::sweep(names.map(|(_, name)| self.folder.join(name)));
     }
 
     fn pieces(&self) -> Vec<Piece> {

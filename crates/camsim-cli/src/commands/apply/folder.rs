@@ -101,6 +101,7 @@ pub(super) fn run(
         finished: false,
     };
     write_manifest(args, &manifest)?;
+    files.sweep(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
     write_atomic(&folder.join("camera.toml"), camera_toml(spec).or_failed()?.as_bytes()).or_failed()?;
     // A resumed folder may hold frames beyond those asked for now.
     let kept = |index: &u64| frames.binary_search(index).is_ok() || (args.resume && files.exist(number(*index)));

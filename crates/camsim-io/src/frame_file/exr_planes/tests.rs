@@ -68,6 +68,26 @@ fn blenders_multilayer_files_need_no_names() {
 }
 
 #[test]
+fn mist_is_no_depth() {
+    let without_depth: Vec<(&str, f32)> = BLENDER.iter().copied().filter(|(name, _)| !name.contains("Depth")).collect();
+    let error = read(&[("", 0, &without_depth)], DEPTH).unwrap_err();
+    assert!(error.contains("has no channel Z, but ViewLayer.Combined.A"), "{error}");
+    let asked = read(&[("", 0, &without_depth)], &format!("{DEPTH}depth_channel = \"Mist.Z\"\n"));
+    assert_eq!(first(&asked.unwrap())[3], 0.5);
+}
+
+#[test]
+fn the_optical_axis_is_in_the_middle_of_the_display() {
+    let axis_px = |at: i32, text: &str| {
+        let file = read(&[("", at, &[("B", 0.0), ("G", 0.0), ("R", 0.0), ("Z", 1.0)])], &format!("{DEPTH}{text}")).unwrap();
+        file.frame.geometry.principal_px.to_array()
+    };
+    // The display is pixels 0 and 1. Of it a crop that begins at 1, and more of it than is shown from -1 on.
+    assert_eq!([axis_px(0, ""), axis_px(1, ""), axis_px(-1, "")], [[0.5, 0.0], [-0.5, 0.0], [1.5, 0.0]]);
+    assert_eq!(axis_px(1, "principal_point_px = [3, 4]\n"), [3.0, 4.0]);
+}
+
+#[test]
 fn every_part_is_read() {
     let parts: [Part<'_>; 3] = [
         ("rgba", 0, &[("B", 0.75), ("G", 0.5), ("R", 0.25)]),
@@ -106,4 +126,15 @@ fn what_cannot_be_told_apart_is_listed() {
         assert!(error.contains(expected), "{text}\n  gives {error}\n  not   {expected}");
     }
     assert_eq!(first(&read(&plain, &format!("{DEPTH}depth_channel = \"dist\"\n")).unwrap())[3], 2.0);
+}
+
+#[test]
+fn files_that_are_none_are_told_from_files_that_are_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("FRAME.toml");
+    fs::write(&path, "color = \"a.exr\"\nfocal_px = [2, 2]\n").unwrap();
+    let error = || read_frame(&path).unwrap_err().to_string();
+    assert!(error().contains("a.exr: cannot be read as EXR: ") && error().ends_with("paths are relative to FRAME.toml"), "{}", error());
+    fs::write(folder.path().join("a.exr"), "no picture").unwrap();
+    assert!(error().ends_with("it is cut off, or no EXR"), "{}", error());
 }

@@ -1,0 +1,93 @@
+//! Depth in PFM files (AirSim) and TIFF files (what OpenCV makes of an array of floats, or of 16-bit numbers).
+
+use std::path::Path;
+
+use super::{DepthRows, FrameFileError, images::failure};
+use crate::terrain::raster::{Raster, is_tiff};
+
+/// The numbers of a depth picture, row by row from the top.
+pub(super) struct Stored {
+    pub(super) size_px: [u32; 2],
+    pub(super) values: Vec<f64>,
+    /// Whole numbers, whose unit must be said; otherwise metres.
+    pub(super) whole: bool,
+}
+
+/// The numbers of a PFM or a TIFF file, told by content; `None` if it is neither.
+pub(super) fn read(path: &Path, rows: Option<DepthRows>, frame_path: &Path) -> Result<Option<Stored>, FrameFileError> {
+    let key = |message: &str| FrameFileError::Key { path: frame_path.into(), key: "depth_rows", message: message.to_owned() };
+    // What cannot be opened is told of by whoever reads pictures.
+    let Ok(tiff) = is_tiff(path) else { return Ok(None) };
+    let pfm = !tiff && begins_as_pfm(path);
+    match rows {
+        Some(_) if !pfm => Err(key("is for PFM, and depth is none; leave it out")),
+        Some(rows) => read_pfm(path, rows).map(Some),
+        None if pfm => Err(key(
+            "is missing: a PFM begins with the bottom row by its definition (\"bottom-up\"), and with the top one as AirSim writes it (\"top-down\")",
+        )),
+        None if tiff => read_tiff(path).map(Some),
+        None => Ok(None),
+    }
+}
+
+fn read_tiff(path: &Path) -> Result<Stored, FrameFileError> {
+    let raster = Raster::read(path).map_err(|error| failure(path, error.reason()))?;
+    let Some(whole) = raster.depth_is_whole() else {
+        return Err(failure(path, "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of these"));
+    };
+    let pixels = raster.size[0] as usize * raster.size[1] as usize;
+    Ok(Stored { size_px: raster.size, values: (0..pixels).map(|pixel| raster.value(pixel)).collect(), whole })
+}
+
+fn begins_as_pfm(path: &Path) -> bool {
+    use std::io::Read;
+    let mut start = [0; 3];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    read.is_ok() && matches!(start, [b'P', b'f' | b'F', next] if next.is_ascii_whitespace())
+}
+
+/// `Pf`, width, height, a number whose sign tells the byte order, one white space, and the rows.
+fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
+    let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}")))?;
+    let wrong = |message: String| failure(path, message);
+    let (words, data) = header(&bytes).ok_or_else(|| wrong("is a PFM that ends within its header".to_owned()))?;
+    if words[0] == "PF" {
+        return Err(wrong("is a PFM of three channels (PF): depth is of one (Pf)".to_owned()));
+    }
+    let side = |word: &str| word.parse::<u32>().ok().filter(|side| *side > 0);
+    let order = words[3].parse::<f64>().ok().filter(|scale| scale.is_finite() && *scale != 0.0);
+    let (Some(width), Some(height), Some(order)) = (side(words[1]), side(words[2]), order) else {
+        let [_, width, height, scale] = words;
+        return Err(wrong(format!("is a PFM of `{width}` by `{height}` pixels and scale `{scale}`: that is no header of one")));
+    };
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels.checked_mul(4) != Some(data.len() as u64) {
+        return Err(wrong(format!("says {width}x{height} pixels and holds {} bytes of them: it is cut off or damaged", data.len())));
+    }
+    let number = |b: &[u8]| {
+        let bytes = [b[0], b[1], b[2], b[3]];
+        f64::from(if order < 0.0 { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) })
+    };
+    let mut lines: Vec<&[u8]> = data.chunks_exact(4 * width as usize).collect();
+    if rows == DepthRows::BottomUp {
+        lines.reverse();
+    }
+    let values = lines.into_iter().flat_map(|line| line.chunks_exact(4).map(number)).collect();
+    Ok(Stored { size_px: [width, height], values, whole: false })
+}
+
+/// Four words, and what follows the one white space after them.
+fn header(bytes: &[u8]) -> Option<([&str; 4], &[u8])> {
+    let mut rest = bytes;
+    let mut words = [""; 4];
+    for word in &mut words {
+        rest = rest.get(rest.iter().take(32).position(|byte| !byte.is_ascii_whitespace())?..)?;
+        let length = rest.iter().take(32).position(u8::is_ascii_whitespace)?;
+        *word = std::str::from_utf8(rest.get(..length)?).ok()?;
+        rest = rest.get(length..)?;
+    }
+    Some((words, rest.get(1..)?))
+}
+
+#[cfg(test)]
+mod tests;
