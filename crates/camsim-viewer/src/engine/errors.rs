@@ -9,8 +9,9 @@ use super::picture::{Picture, ramp};
 
 /// Decades of error, below the largest, that the colours tell apart.
 pub const DECADES: f64 = 2.0;
-/// What is left of the picture's own light.
-const PICTURE_SHARE: f32 = 0.45;
+/// What is left of the picture's own light: of colours, which keep their hue by it, and where there is none.
+const OF_COLOR: f32 = 0.4;
+const OF_GREY: f32 = 0.45;
 
 /// What is predicted of one picture.
 #[derive(Debug)]
@@ -62,10 +63,13 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
         if pixel.a() == 0 {
             return Color32::TRANSPARENT;
         }
-        let grey = PICTURE_SHARE * (0.3 * f32::from(pixel.r()) + 0.59 * f32::from(pixel.g()) + 0.11 * f32::from(pixel.b()));
+        let light = 0.3 * f32::from(pixel.r()) + 0.59 * f32::from(pixel.g()) + 0.11 * f32::from(pixel.b());
         let cell = (i / width * rows / height) * columns + i % width * columns / width;
-        let [r, g, b] = colors.get(cell).copied().flatten().map_or([0.0; 3], |color| color.map(|c| (1.0 - PICTURE_SHARE) * f32::from(c)));
-        Color32::from_rgb((grey + r) as u8, (grey + g) as u8, (grey + b) as u8)
+        let [r, g, b] = match colors.get(cell).copied().flatten() {
+            Some(color) => color.map(|c| f32::from(c) * (1.0 - OF_COLOR + OF_COLOR * light / 255.0)),
+            None => [OF_GREY * light; 3],
+        };
+        Color32::from_rgb(r as u8, g as u8, b as u8)
     });
     ColorImage::new(image.size, pixels.collect())
 }

@@ -10,6 +10,7 @@ use egui_kittest::kittest::Queryable;
 use super::harness::{Window, demo, pattern};
 use crate::{
     engine::Stage,
+    state::State,
     view::{Compare, Overlays, View},
 };
 
@@ -143,18 +144,24 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
         window.state_mut().view.overlays = only;
         // Some are asked for.
         window.settle();
+        window.wait("errors", |state| !only.error || has_errors(state));
         assert_ne!(window.picture(), plain, "{name} shows");
     }
     window.state_mut().view.overlays = overlays;
     window.settle();
-    window.step();
+    window.wait("errors", has_errors);
     let part = window.harness.get_by_label("picture").rect();
     window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));
     window.state_mut().view = View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
     window.settle();
-    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truth.clone()).expect("depth");
+    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truths.first().cloned()).expect("depth");
     assert_eq!(truth.depth_m.len(), 640 * 480);
     assert!(truth.depth_m.iter().any(|depth| *depth > 100.0));
+}
+
+/// Whether what is predicted of the pictures on show has come.
+fn has_errors(state: &State) -> bool {
+    state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty() && shown.errors.len() == shown.reply.pictures.len())
 }
 
 #[test]
