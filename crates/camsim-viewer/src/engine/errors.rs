@@ -97,6 +97,10 @@ mod tests {
         assert!(light(6) > light(0) && light(0) > 0, "{} {}", light(6), light(0));
         assert_eq!([light(2), light(3), light(4), light(5)], [0; 4], "silhouettes and what has no source keep the picture's grey");
         assert_eq!(tinted.pixels[7], Color32::TRANSPARENT);
+        // A bright picture changes how light a colour is, not which.
+        let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map);
+        let share = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
+        assert!((share(white.pixels[6]) - share(tinted.pixels[6])).abs() < 0.02 && white.pixels[6].g() > tinted.pixels[6].g());
         assert_eq!([share_of_scale(0.1, 0.1), share_of_scale(0.01, 0.1), share_of_scale(1e-6, 0.1)], [1.0, 0.5, 0.0]);
     }
 }

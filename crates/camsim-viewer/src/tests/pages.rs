@@ -57,16 +57,6 @@ fn motion_paths_end_where_the_pixel_is() {
     }
 }
 
-/// Plots are worked out beside the window.
-fn await_plots(window: &mut Window) {
-    let begun = std::time::Instant::now();
-    while !has(window, "north, m") {
-        assert!(begun.elapsed() < std::time::Duration::from_secs(60), "no plots");
-        window.step();
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-}
-
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn plan_plots_map_and_export_have_what_they_should() {
@@ -75,8 +65,15 @@ fn plan_plots_map_and_export_have_what_they_should() {
     window.click("Plan");
     assert!(has(&window, "- readback"), "the last pass");
     assert!(has(&window, "predicted error"));
+    let is_broken = |window: &Window| window.harness.query_all_by_label_contains("the tolerance is NOT KEPT: ").next().is_some();
+    assert!(!is_broken(&window));
+    send(&mut window, Message::Set("quality.max_error_dn".into(), Some(toml::Value::Float(0.02)), false));
+    window.settle();
+    assert!(is_broken(&window), "grey levels have a tolerance too");
+    send(&mut window, Message::Undo);
+    window.settle();
     window.click("Plots");
-    await_plots(&mut window);
+    window.wait_for("north, m");
     assert!(has(&window, "speed, m/s"));
     window.snapshot("plots", window.page().with_max_y(330.0));
     window.click("Map");
@@ -207,7 +204,7 @@ fn nothing_open_and_a_log_of_ten_hours() {
         window.click(tab);
         window.step();
         if tab == "Plots" {
-            await_plots(&mut window);
+            window.wait_for("north, m");
         }
     }
     assert_eq!(window.state().heard.gaps_s, [[4999.0, 5060.0]]);
