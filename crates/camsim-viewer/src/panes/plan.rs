@@ -18,10 +18,11 @@ pub fn show(ui: &mut Ui, state: &State) {
     if shown.reply.wanted.size == Size::Preview {
         ui.weak("of the preview; the frame's own plan follows when the hand rests");
     }
+    let has_terrain = state.heard.sequence().is_some_and(|sequence| sequence.scene.terrain.is_some());
     for picture in &shown.reply.pictures {
         ui.strong(format!("frame {}, {}", picture.plan.frame, picture.stage.label()));
         passes(ui, picture);
-        errors(ui, picture);
+        errors(ui, picture, has_terrain);
         skipped(ui, picture);
         ui.separator();
     }
@@ -52,13 +53,13 @@ fn passes(ui: &mut Ui, picture: &Picture) {
 }
 
 /// What is predicted, and whether that is what the scenario asks for.
-fn errors(ui: &mut Ui, picture: &Picture) {
+fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let predicted = &picture.plan.predicted;
     if predicted.probes == 0 {
         verdict(ui, false, Some("no pixel that was tried has a source in the ideal frame: the picture is empty"));
         return;
     }
-    facts(ui, &format!("errors {}", picture.stage.label()), |ui| sources(ui, picture));
+    facts(ui, &format!("errors {}", picture.stage.label()), |ui| sources(ui, picture, has_terrain));
     verdict(ui, predicted.kept, predicted.in_the_way.as_deref());
     facts(ui, &format!("levels {}", picture.stage.label()), |ui| levels(ui, predicted));
     verdict(ui, predicted.levels_kept, predicted.levels_in_the_way.as_deref());
@@ -77,7 +78,7 @@ fn verdict(ui: &mut Ui, kept: bool, cause: Option<&str>) {
 }
 
 /// Of source coordinates, by cause.
-fn sources(ui: &mut Ui, picture: &Picture) {
+fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let plan = &picture.plan;
     let predicted = &plan.predicted;
     fact(ui, "predicted error", format!("{:.4} px", predicted.total_px), "bound on the 99th percentile of the source coordinate's error");
@@ -91,7 +92,7 @@ fn sources(ui: &mut Ui, picture: &Picture) {
     for (what, px, tip) in parts {
         fact(ui, what, format!("{px:.5} px"), tip);
     }
-    if plan.terrain_error_px > 0.0 {
+    if has_terrain {
         fact(ui, "terrain", format!("{:.3} px", plan.terrain_error_px), "bound on what its level of detail moves; counted apart");
     }
     if predicted.silhouette_share > 0.0 {

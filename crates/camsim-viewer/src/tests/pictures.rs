@@ -152,6 +152,22 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
     window.wait("errors", has_errors);
     let part = window.harness.get_by_label("picture").rect();
     window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));
+    // On the right of a wipe, too: of two stages the one that takes time is there.
+    let half = View { compare: Compare::Wipe, a: Stage::Ideal, b: Stage::Time, ..View::default() };
+    let [without, with] = [false, true].map(|rows| {
+        window.state_mut().view = View { overlays: Overlays { rows, ..Overlays::default() }, ..half.clone() };
+        window.settle();
+        window.step();
+        window.picture()
+    });
+    let pane = window.harness.get_by_label("picture").rect();
+    let differs = |(x, _, pixel): &(u32, u32, &image::Rgba<u8>)| {
+        f64::from(*x) > f64::from(pane.center().x) + 2.0
+            && f64::from(*x) < f64::from(pane.right())
+            && without.get_pixel(*x, (pane.center().y + 20.0) as u32) != *pixel
+    };
+    let row = (pane.center().y + 20.0) as u32;
+    assert!(with.enumerate_pixels().filter(|(_, y, _)| *y == row).filter(differs).count() >= 5, "row times right of the line");
     window.state_mut().view = View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
     window.settle();
     let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truths.first().cloned()).expect("depth");

@@ -40,11 +40,11 @@ pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &Sig
     if overlays.depth
         && let Some((truth, _)) = sight.depth
     {
-        depth_scale(painter, placement, truth.range_m);
+        depth_scale(painter, truth.range_m);
     } else if overlays.error
         && let (Some(plan), Some((errors, _))) = (sight.plan, sight.errors)
     {
-        error_scale(painter, placement, &errors.map, plan.predicted.total_px);
+        error_scale(painter, &errors.map, plan.predicted.total_px);
     }
 }
 
@@ -109,7 +109,7 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
     let [width, height] = camera.size_px;
     let mids: Vec<f64> = (0..height).map(|y| shutter.dt_pixel_s(width / 2, y)).collect();
     let (first_s, last_s) = mids.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-    let left = placement.rect().left().max(placement.pane.left());
+    let left = painter.clip_rect().left();
     let step = (height / 240).max(1);
     for y in (0..height).step_by(step as usize) {
         let t_s = mids.get(y as usize).copied().unwrap_or_default();
@@ -118,7 +118,7 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
         painter.rect_filled(Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
     }
     for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
-        let seen = placement.rect().intersect(placement.pane).shrink(7.0);
+        let seen = painter.clip_rect().shrink(7.0);
         let at = pos2(left + 13.0, placement.screen(0.0, f64::from(y)).y.clamp(seen.top(), seen.bottom().max(seen.top())));
         let text = format!("{:+.2} ms", 1e3 * mids.get(y as usize).copied().unwrap_or_default());
         painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(11.0), Color32::WHITE);
@@ -126,21 +126,22 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
 }
 
 /// What the colours mean, and the bound for the frame as a whole.
-fn error_scale(painter: &Painter, placement: &Placement, map: &ErrorMap, total_px: f64) {
+fn error_scale(painter: &Painter, map: &ErrorMap, total_px: f64) {
     let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
     let least = format!("{:.1e}", largest_px * 10.0_f64.powf(-DECADES));
     let most = format!("{largest_px:.1e} px predicted; grey: counted apart");
-    scale(painter, placement, [least, most], &format!("99 % of the frame's pixels within {total_px:.4} px"), |share| share);
+    scale(painter, [least, most], &format!("99 % of the frame's pixels within {total_px:.4} px"), |share| share);
 }
 
-fn depth_scale(painter: &Painter, placement: &Placement, range_m: Option<[f32; 2]>) {
+fn depth_scale(painter: &Painter, range_m: Option<[f32; 2]>) {
     let ends = range_m.map_or_else(|| ["nothing".into(), "there".into()], |range_m| range_m.map(|m| format!("{m:.3} m")));
-    scale(painter, placement, ends, "planar depth, by its logarithm", |share| 1.0 - share);
+    scale(painter, ends, "planar depth, by its logarithm", |share| 1.0 - share);
 }
 
 /// Colours from left to right with what they stand for at the ends, and a line below, in the lower left corner of what is seen.
-fn scale(painter: &Painter, placement: &Placement, ends: [String; 2], below: &str, color: impl Fn(f64) -> f64) {
-    let seen = placement.rect().intersect(placement.pane);
+fn scale(painter: &Painter, ends: [String; 2], below: &str, color: impl Fn(f64) -> f64) {
+    // Of two pictures by a wipe each has its own, on its side of the line.
+    let seen = painter.clip_rect();
     let low = pos2(seen.left() + 6.0, seen.bottom() - 38.0);
     let galley = |text: &str| painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.0), Color32::WHITE);
     let ([least, most], below) = (ends.map(|text| galley(&text)), galley(below));
