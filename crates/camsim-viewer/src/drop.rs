@@ -17,6 +17,9 @@ pub const PICTURE_USES: [(&str, &str); 3] = [
     ("pattern", "scene.pattern.image"),
 ];
 
+/// Keys of a board that another one at the same place has too.
+const PLACE_OF_BOARD: [&str; 3] = ["at", "geodetic", "angles_deg"];
+
 /// The order in which files that are dropped together are taken: a scenario before what becomes part of it.
 pub fn rank(path: &Path) -> u8 {
     let is_toml = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
@@ -46,7 +49,7 @@ pub fn take(state: &mut State, path: &Path) {
         "toml" if is_camera(path) => camera(state, read_checked_camera(path).map_err(|error| error.to_string())),
         "toml" if state.is_unsaved() => state.leaving = Some(Leaving::For(path.into())),
         "toml" => state.open(path.into()),
-        "yaml" | "yml" if is_target(path) => set(state, "scene.board.target", path),
+        "yaml" | "yml" if is_target(path) => target(state, path),
         "yaml" | "yml" | "xml" | "json" => camera(state, import_camera(path).map_err(|error| error.to_string())),
         "csv" | "txt" | "tum" | "log" => set(state, "flight.log", path),
         "png" | "jpg" | "jpeg" | "bmp" | "gif" | "pgm" | "ppm" => {
@@ -87,14 +90,42 @@ fn is_target(path: &Path) -> bool {
     std::fs::read_to_string(path).is_ok_and(|text| text.lines().any(|line| line.trim_start().starts_with("target_type")))
 }
 
+/// What the pixel that is kept sees, north, east, down.
+fn kept_point(state: &State) -> Option<[f64; 3]> {
+    state.pinned.and_then(|pixel| state.heard.point_ned_m(pixel)).map(|point| point.to_array())
+}
+
+fn floats(values: [f64; 3]) -> Value {
+    Value::Array(values.into_iter().map(Value::Float).collect())
+}
+
+/// A calibration board: in place of the one that is there and where that is, else where the pixel that is kept looks.
+fn target(state: &mut State, path: &Path) {
+    let seen = kept_point(state);
+    let told = match &mut state.document {
+        Some(document) => std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display())).and_then(|file| {
+            let at = seen.filter(|_| document.value("scene.board").is_none());
+            let mut board = document.value("scene.board").and_then(Value::as_table).cloned().unwrap_or_default();
+            board.retain(|key, _| PLACE_OF_BOARD.contains(&key));
+            if let Some(point) = at {
+                board.insert("at".into(), floats(point));
+            }
+            board.insert("target".into(), Value::String(file.display().to_string()));
+            put(document, "scene.board", Value::Table(board), path)
+        }),
+        None => Err(no_scenario(path)),
+    };
+    after(state, told);
+}
+
 /// One more model: where the pixel that is kept looks at, else at the origin; on the ground if there is any.
 fn model(state: &mut State, path: &Path) {
-    let at = state.pinned.and_then(|pixel| state.heard.point_ned_m(pixel)).map_or([0.0; 3], |point| point.to_array());
+    let at = kept_point(state).unwrap_or_default();
     let told = match &mut state.document {
         Some(document) => std::path::absolute(path).map_err(|error| format!("{}: {error}", path.display())).and_then(|file| {
             let mut entry = Table::new();
             entry.insert("file".into(), Value::String(file.display().to_string()));
-            entry.insert("at".into(), Value::Array(at.into_iter().map(Value::Float).collect()));
+            entry.insert("at".into(), floats(at));
             entry.insert("on_ground".into(), Value::Boolean(document.value("scene.terrain").is_some()));
             let mut list = document.value("scene.gltf").and_then(Value::as_array).cloned().unwrap_or_default();
             list.push(Value::Table(entry));

@@ -25,7 +25,7 @@ use std::{
 pub use errors::{DECADES, Errors};
 use library::Library;
 pub use mailbox::Mailbox;
-pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Wanted};
+pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Truth, Wanted};
 pub use picture::{Difference, Picture, ramp};
 pub use variants::{preview_factor, staged};
 

@@ -1,15 +1,18 @@
 //! What the engine has said: the last pictures, what is loaded, what went wrong.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
-use camsim_core::{plan::FramePlan, reference::Oracle, sequence::Sequence};
+use camsim_core::{flight_log::FlightLog, plan::FramePlan, reference::Oracle, sequence::Sequence};
 use camsim_io::load::Loaded;
 use eframe::egui;
 
 use crate::{
-    engine::{Difference, Errors, ExactPicture, FrameReply, Picture, Reply, Size, Stage},
+    engine::{Difference, Errors, ExactPicture, FrameReply, Picture, Reply, Size, Stage, Truth},
     sheet::Sheet,
 };
+
+/// Steps between two rows of the log that are marked, seconds of the log: more than one, and than what rounding makes of one.
+const GAP_S: f64 = 1.0 + 1e-6;
 
 /// All that panes know of the engine.
 #[derive(Default)]
@@ -18,8 +21,12 @@ pub struct Heard {
     pub adapter: String,
     /// What takes long; empty for nothing.
     pub busy: String,
+    /// Since when.
+    pub busy_since: Option<Instant>,
     /// The last scenario whose files were read.
     pub loaded: Option<Arc<Loaded>>,
+    /// Spans without rows of its log, path time.
+    pub gaps_s: Vec<[f64; 2]>,
     /// The last pictures.
     pub shown: Option<Shown>,
     /// For looks into single pixels.
@@ -44,9 +51,9 @@ pub struct Shown {
     pub sheets: Vec<Sheet>,
     /// The difference there.
     pub difference: Option<Sheet>,
-    /// The depth there.
-    pub depth: Option<Sheet>,
-    /// The predicted errors there, one for each picture, if they were wanted.
+    /// The depth there, one for each picture, if it was wanted.
+    pub depths: Vec<Sheet>,
+    /// The predicted errors there, one for each picture, if they were wanted and have come.
     pub errors: Vec<Sheet>,
 }
 
@@ -75,6 +82,8 @@ pub struct Sight<'a> {
     pub plan: Option<&'a FramePlan>,
     /// Its predicted error from place to place, if that was wanted, and on the screen.
     pub errors: Option<(&'a Errors, &'a Sheet)>,
+    /// Its depth, if that was wanted, and on the screen; the oracle's picture has none.
+    pub depth: Option<(&'a Truth, &'a Sheet)>,
 }
 
 impl Heard {
@@ -83,8 +92,17 @@ impl Heard {
         self.replies += 1;
         match reply {
             Reply::Adapter(adapter) => self.adapter = adapter,
-            Reply::Busy(what) => self.busy = what,
-            Reply::Loaded(loaded) => self.loaded = Some(loaded),
+            Reply::Busy(what) => {
+                self.busy_since = (!what.is_empty()).then(Instant::now);
+                self.busy = what;
+            }
+            Reply::Loaded(loaded) => {
+                // Hours of rows are looked through once, not with each pass.
+                if !self.loaded.as_ref().is_some_and(|before| Arc::ptr_eq(&before.log, &loaded.log)) {
+                    self.gaps_s = gaps_s(&loaded.log, loaded.sequence.scenario.flight.speed);
+                }
+                self.loaded = Some(loaded);
+            }
             Reply::Looks(looks) => self.looks = Some(looks),
             Reply::Failed(fault) => self.fault = Some(fault),
             // The state keeps it.
@@ -99,6 +117,11 @@ impl Heard {
                 }
                 self.fault = None;
                 self.shown = Some(Shown::new(*reply, self.shown.take(), context));
+            }
+            Reply::Errors(reply) => {
+                if let Some(shown) = self.shown.as_mut().filter(|shown| shown.reply.wanted == reply.wanted) {
+                    shown.take_errors(reply.errors, context);
+                }
             }
             Reply::Exact(picture) => {
                 let (old, old_difference) = self.exact.take().map_or((None, None), |exact| (Some(exact.sheet), exact.difference));
@@ -121,13 +144,14 @@ impl Heard {
         if stage == Stage::Oracle {
             let Exact { picture, sheet, .. } = self.current_exact()?;
             let size_px = picture.sequence.scenario.camera.size_px;
-            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None, errors: None });
+            return Some(Sight { sheet, size_px, color_rgba: &picture.color_rgba, stage, plan: None, errors: None, depth: None });
         }
         let at = shown.reply.pictures.iter().position(|picture| picture.stage == stage)?;
         let (picture, sheet) = (shown.reply.pictures.get(at)?, shown.sheets.get(at)?);
         let (size_px, color_rgba) = (picture.frame.size_px, &picture.frame.color_rgba);
         let errors = shown.reply.errors.get(at).map(|errors| &**errors).zip(shown.errors.get(at));
-        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan), errors })
+        let depth = shown.reply.truths.get(at).map(|truth| &**truth).zip(shown.depths.get(at));
+        Some(Sight { sheet, size_px, color_rgba, stage, plan: Some(&picture.plan), errors, depth })
     }
 
     /// Path time of a frame's stamp, seconds.
@@ -176,16 +200,38 @@ impl Heard {
 
 impl Shown {
     fn new(reply: FrameReply, before: Option<Self>, context: &egui::Context) -> Self {
-        let (old, old_difference, old_depth, old_errors) =
-            before.map_or((Vec::new(), None, None, Vec::new()), |before| (before.sheets, before.difference, before.depth, before.errors));
-        let mut old = old.into_iter();
-        let sheets = reply.pictures.iter().map(|picture| Sheet::new(context, "picture", picture.image.clone(), old.next())).collect();
+        let (old, old_difference, old_depths, old_errors) =
+            before.map_or_else(Default::default, |before| (before.sheets, before.difference, before.depths, before.errors));
+        let pictures = reply.pictures.iter().map(|picture| &picture.image);
         let difference =
             reply.difference.as_ref().map(|difference| Sheet::new(context, "difference", difference.image.clone(), old_difference));
-        let depth = reply.truth.as_ref().map(|truth| Sheet::new(context, "depth", truth.image.clone(), old_depth));
-        let mut old_errors = old_errors.into_iter();
-        let errors =
-            reply.errors.iter().map(|errors| Sheet::new(context, "predicted error", errors.image.clone(), old_errors.next())).collect();
-        Self { reply, sheets, difference, depth, errors }
+        Self {
+            sheets: sheets("picture", pictures, old, context),
+            depths: sheets("depth", reply.truths.iter().map(|truth| &truth.image), old_depths, context),
+            errors: sheets("predicted error", reply.errors.iter().map(|errors| &errors.image), old_errors, context),
+            difference,
+            reply,
+        }
     }
+
+    fn take_errors(&mut self, errors: Vec<Arc<Errors>>, context: &egui::Context) {
+        let old = std::mem::take(&mut self.errors);
+        self.errors = sheets("predicted error", errors.iter().map(|errors| &errors.image), old, context);
+        self.reply.errors = errors;
+    }
+}
+
+/// Steps of the log's clock that count as gaps, as the log's report counts them; on the timeline they are shorter by its `speed`.
+fn gaps_s(log: &FlightLog, speed: f64) -> Vec<[f64; 2]> {
+    if log.report.gaps.count == 0 {
+        return Vec::new();
+    }
+    let steps = log.rows.windows(2).map(|pair| [pair[0].t_s, pair[1].t_s]);
+    steps.filter(|[from_s, to_s]| (to_s - from_s) * speed > GAP_S).collect()
+}
+
+/// Pictures on the screen, in place of older ones.
+fn sheets<'a>(name: &str, images: impl Iterator<Item = &'a Arc<egui::ColorImage>>, old: Vec<Sheet>, context: &egui::Context) -> Vec<Sheet> {
+    let mut old = old.into_iter();
+    images.map(|image| Sheet::new(context, name, image.clone(), old.next())).collect()
 }

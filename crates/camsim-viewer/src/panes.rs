@@ -21,6 +21,9 @@ use crate::{
     view::Tab,
 };
 
+/// Widths of a window, points, below which it has no parameters, and no pages.
+const NARROW: [f32; 2] = [640.0, 860.0];
+
 /// All panes.
 pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     // The window is cleared in the colour of panels: to paint it once more would be the larger part of a pass on a software adapter.
@@ -28,18 +31,24 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     let panel = egui::Frame::side_top_panel(&style).fill(egui::Color32::TRANSPARENT);
     egui::Panel::top("menu").frame(panel).show(ui, |ui| menu::show(ui, state, out));
     egui::Panel::bottom("timeline").frame(panel).show(ui, |ui| timeline::show(ui, state, out));
-    egui::Panel::left("parameters")
-        .frame(panel)
-        .resizable(true)
-        .default_size(300.0)
-        .size_range(180.0..=600.0)
-        .show(ui, |ui| parameters::show(ui, state, out));
-    egui::Panel::right("pages")
-        .frame(panel)
-        .resizable(true)
-        .default_size(330.0)
-        .size_range(220.0..=700.0)
-        .show(ui, |ui| pages(ui, state, out));
+    // Beside the picture only as far as there is room: panels would lie on it, and on each other.
+    let width = ui.available_width();
+    if width >= NARROW[0] {
+        egui::Panel::left("parameters")
+            .frame(panel)
+            .resizable(true)
+            .default_size(300.0)
+            .size_range(180.0..=(0.4 * width).clamp(180.0, 600.0))
+            .show(ui, |ui| parameters::show(ui, state, out));
+    }
+    if width >= NARROW[1] {
+        egui::Panel::right("pages")
+            .frame(panel)
+            .resizable(true)
+            .default_size(330.0)
+            .size_range(220.0..=(0.4 * width).clamp(220.0, 700.0))
+            .show(ui, |ui| pages(ui, state, out));
+    }
     egui::CentralPanel::default().frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT)).show(ui, |ui| {
         notices::show(ui, state, out);
         image_view::show(ui, state, out);

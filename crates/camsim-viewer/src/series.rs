@@ -1,8 +1,12 @@
 //! Numbers over the flight, for plots.
 
+mod desk;
+
 use std::sync::{Arc, Weak};
 
+use camsim_core::flight_log::FlightLog;
 use camsim_io::load::Loaded;
+pub use desk::Desk;
 use glam::{DQuat, DVec3, EulerRot};
 
 /// Instants of a line: more than a plot has points across.
@@ -14,6 +18,7 @@ const MOST_BETWEEN: u64 = 50;
 #[derive(Clone, Debug)]
 pub struct Series {
     of: Weak<Loaded>,
+    log: Weak<FlightLog>,
     /// Path time of the window's beginning.
     pub start_s: f64,
     /// One plot each.
@@ -51,7 +56,7 @@ impl Series {
             let tracked = over(&|t_s| of_tracker(loaded, t_s)[axis]);
             let Errors { rms, largest, points } = errors[axis].clone();
             let (unit, is_angle) = if axis < 3 { ("m", false) } else { ("deg", true) };
-            let note = format!("error {rms:.3} {unit} RMS, {largest:.3} at most");
+            let note = format!("error {} {unit} RMS, {} at most", digits(rms), digits(largest));
             let lines = [("log", of_log), ("tracker", tracked)];
             let lines = lines.into_iter().map(|(name, points)| (name, if is_angle { continuous(points) } else { points })).collect();
             channels.push(Channel { name, note, lines, limit: None, error: Some(points) });
@@ -70,13 +75,24 @@ impl Series {
         let image_speed = |t_s: f64| image_speed_px_s(loaded, focal_px, t_s);
         plain("blur in the middle, px", over(&|t_s| image_speed(t_s) * exposure_s), None);
         plain("row skew in the middle, px", over(&|t_s| image_speed(t_s) * readout_s), None);
-        Self { of: Arc::downgrade(loaded), start_s: sequence.start_s, channels }
+        Self { of: Arc::downgrade(loaded), log: Arc::downgrade(&loaded.log), start_s: sequence.start_s, channels }
     }
 
     /// Whether it is of this.
     pub fn is_of(&self, loaded: &Arc<Loaded>) -> bool {
         std::ptr::eq(self.of.as_ptr(), Arc::as_ptr(loaded))
     }
+
+    /// Whether it is of the same log, if perhaps by another camera.
+    pub fn is_of_log(&self, loaded: &Loaded) -> bool {
+        std::ptr::eq(self.log.as_ptr(), Arc::as_ptr(&loaded.log))
+    }
+}
+
+/// Three decimals, or for what is small three digits.
+fn digits(value: f64) -> String {
+    let zeros = if value == 0.0 { 0.0 } else { (-value.abs().log10()).floor().clamp(0.0, 5.0) };
+    format!("{value:.*}", 3 + zeros as usize)
 }
 
 /// How far the tracker is from the log.
@@ -221,6 +237,14 @@ mod tests {
                 assert!((shorter_deg(found - error)).abs() < 1e-9, "{} at {t_s}: {found} {error}", channel.name);
             }
         }
+    }
+
+    #[test]
+    fn what_is_small_has_digits_too() {
+        assert_eq!(
+            [digits(0.0), digits(12.3456), digits(0.1234), digits(0.0191), digits(0.000_312)],
+            ["0.000", "12.346", "0.123", "0.0191", "0.000312"]
+        );
     }
 
     #[test]

@@ -145,7 +145,10 @@ impl State {
             Reply::Frame(reply) => {
                 let (Some(wanted), Some(shown)) = (self.wanted(), &self.heard.shown) else { return false };
                 match reply.wanted.size {
-                    Size::Full => wanted.size == Size::Preview && Wanted { size: Size::Full, ..wanted } != reply.wanted,
+                    Size::Full => {
+                        let at_rest = Wanted { size: Size::Full, errors: reply.wanted.errors, ..wanted.clone() };
+                        wanted.size == Size::Preview && at_rest != reply.wanted
+                    }
                     Size::Preview => shown.reply.wanted == wanted,
                 }
             }
@@ -160,16 +163,22 @@ impl State {
         let compares = self.view.compare == Compare::Difference && stages.len() == 2;
         let moving = self.timeline.dragged || self.rests_in_s().is_some();
         let playing = self.timeline.playing && self.heard.full_ms.is_none_or(|ms| ms > QUICK_MS);
+        let size = if moving || playing { Size::Preview } else { Size::Full };
         Some(Wanted {
             scenario: document.scenario.clone(),
             reading: document.reading,
             frame: self.timeline.frame,
             gain: compares.then_some(self.view.gain),
             stages,
-            size: if moving || playing { Size::Preview } else { Size::Full },
+            size,
             truth: self.view.overlays.depth,
-            errors: self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel,
+            errors: size == Size::Full && self.shows_errors(),
         })
+    }
+
+    /// Whether something on show is about the predicted error from place to place.
+    pub fn shows_errors(&self) -> bool {
+        self.view.overlays.error || self.pinned.is_some() && self.view.tab == Tab::Pixel
     }
 
     /// What the oracle is to do now: once a frame in full size is on show, looks into it; and its own picture if that is on show.

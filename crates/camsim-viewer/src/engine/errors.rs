@@ -9,8 +9,9 @@ use super::picture::{Picture, ramp};
 
 /// Decades of error, below the largest, that the colours tell apart.
 pub const DECADES: f64 = 2.0;
-/// What is left of the picture's own light.
-const PICTURE_SHARE: f32 = 0.45;
+/// What is left of the picture's own light: of colours, which keep their hue by it, and where there is none.
+const OF_COLOR: f32 = 0.4;
+const OF_GREY: f32 = 0.45;
 
 /// What is predicted of one picture.
 #[derive(Debug)]
@@ -62,10 +63,13 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
         if pixel.a() == 0 {
             return Color32::TRANSPARENT;
         }
-        let grey = PICTURE_SHARE * (0.3 * f32::from(pixel.r()) + 0.59 * f32::from(pixel.g()) + 0.11 * f32::from(pixel.b()));
+        let light = 0.3 * f32::from(pixel.r()) + 0.59 * f32::from(pixel.g()) + 0.11 * f32::from(pixel.b());
         let cell = (i / width * rows / height) * columns + i % width * columns / width;
-        let [r, g, b] = colors.get(cell).copied().flatten().map_or([0.0; 3], |color| color.map(|c| (1.0 - PICTURE_SHARE) * f32::from(c)));
-        Color32::from_rgb((grey + r) as u8, (grey + g) as u8, (grey + b) as u8)
+        let [r, g, b] = match colors.get(cell).copied().flatten() {
+            Some(color) => color.map(|c| f32::from(c) * (1.0 - OF_COLOR + OF_COLOR * light / 255.0)),
+            None => [OF_GREY * light; 3],
+        };
+        Color32::from_rgb(r as u8, g as u8, b as u8)
     });
     ColorImage::new(image.size, pixels.collect())
 }
@@ -93,6 +97,10 @@ mod tests {
         assert!(light(6) > light(0) && light(0) > 0, "{} {}", light(6), light(0));
         assert_eq!([light(2), light(3), light(4), light(5)], [0; 4], "silhouettes and what has no source keep the picture's grey");
         assert_eq!(tinted.pixels[7], Color32::TRANSPARENT);
+        // A bright picture changes how light a colour is, not which.
+        let white = super::tinted(&ColorImage::new([4, 2], vec![Color32::WHITE; 8]), &map);
+        let share = |pixel: Color32| f32::from(pixel.r()) / f32::from(pixel.g());
+        assert!((share(white.pixels[6]) - share(tinted.pixels[6])).abs() < 0.02 && white.pixels[6].g() > tinted.pixels[6].g());
         assert_eq!([share_of_scale(0.1, 0.1), share_of_scale(0.01, 0.1), share_of_scale(1e-6, 0.1)], [1.0, 0.5, 0.0]);
     }
 }

@@ -77,7 +77,7 @@ pub struct Wanted {
     pub size: Size,
     /// Whether depth is wanted too.
     pub truth: bool,
-    /// Whether the predicted error from place to place is wanted too.
+    /// Whether the predicted error from place to place is wanted too; of previews it never is: it would hold up the next one.
     pub errors: bool,
     /// Enlargement of the difference of the two stages, if it is wanted.
     pub gain: Option<f32>,
@@ -105,6 +105,8 @@ pub enum Reply {
     Loaded(Arc<Loaded>),
     /// Pictures.
     Frame(Box<FrameReply>),
+    /// What is predicted of pictures that were sent.
+    Errors(Box<ErrorsReply>),
     /// Looks into a sequence are possible.
     Looks(Arc<Oracle>),
     /// A picture of the oracle, or part of it.
@@ -120,6 +122,8 @@ pub enum Reply {
 pub struct Truth {
     /// Planar depth, metres, 0 = nothing there; row-major.
     pub depth_m: Vec<f32>,
+    /// The nearest and the farthest of it; `None` where nothing is.
+    pub range_m: Option<[f32; 2]>,
     /// As a screen shows it.
     pub image: Arc<ColorImage>,
 }
@@ -133,14 +137,23 @@ pub struct FrameReply {
     pub frame: u64,
     /// One for each stage wanted.
     pub pictures: Vec<Arc<Picture>>,
-    /// Depth, if wanted.
-    pub truth: Option<Arc<Truth>>,
-    /// What is predicted of each of the pictures, if wanted.
+    /// Depth of each of the pictures, if wanted.
+    pub truths: Vec<Arc<Truth>>,
+    /// What is predicted of each of the pictures, if wanted and known already; else it follows.
     pub errors: Vec<Arc<Errors>>,
     /// The difference of the two pictures, if wanted.
     pub difference: Option<Arc<Difference>>,
     /// From taking up the request to this reply; `None` if all of it was there already.
     pub took: Option<Duration>,
+}
+
+/// The predicted errors of a frame's pictures, which are not kept waiting for them.
+#[derive(Clone, Debug)]
+pub struct ErrorsReply {
+    /// What the pictures were made for.
+    pub wanted: Wanted,
+    /// One for each of them.
+    pub errors: Vec<Arc<Errors>>,
 }
 
 /// A picture of the oracle as far as it has come.

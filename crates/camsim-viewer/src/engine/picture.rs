@@ -76,10 +76,15 @@ pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32) -> Option<
     Some(Difference { image, rms_dn, max_dn: 255.0 * max, one_sided })
 }
 
+/// The nearest and the farthest depth; `None` where nothing is.
+pub fn depth_range_m(depth_m: &[f32]) -> Option<[f32; 2]> {
+    let known = depth_m.iter().copied().filter(|d| *d > 0.0 && d.is_finite());
+    known.map(|d| [d, d]).reduce(|[near, far], [d, _]| [near.min(d), far.max(d)])
+}
+
 /// Depth from near (bright) to far (dark) by its logarithm; transparent where nothing is.
-pub fn depth_image(size_px: [u32; 2], depth_m: &[f32]) -> ColorImage {
-    let known = || depth_m.iter().copied().filter(|d| *d > 0.0 && d.is_finite());
-    let (near, far) = known().fold((f32::INFINITY, 0.0_f32), |(near, far), d| (near.min(d), far.max(d)));
+pub fn depth_image(size_px: [u32; 2], depth_m: &[f32], range_m: Option<[f32; 2]>) -> ColorImage {
+    let [near, far] = range_m.unwrap_or([1.0; 2]);
     let span = (far / near).ln().max(1e-6);
     let pixels = depth_m.iter().map(|&d| {
         if d <= 0.0 || !d.is_finite() {
@@ -125,7 +130,9 @@ mod tests {
 
     #[test]
     fn near_is_bright_and_nothing_is_transparent() {
-        let image = depth_image([3, 1], &[10.0, 1000.0, 0.0]);
+        let depth_m = [10.0, 1000.0, 0.0];
+        assert_eq!((depth_range_m(&depth_m), depth_range_m(&[0.0])), (Some([10.0, 1000.0]), None));
+        let image = depth_image([3, 1], &depth_m, depth_range_m(&depth_m));
         let light = |pixel: Color32| u32::from(pixel.r()) + u32::from(pixel.g()) + u32::from(pixel.b());
         assert!(light(image.pixels[0]) > light(image.pixels[1]));
         assert_eq!(image.pixels[2], Color32::TRANSPARENT);

@@ -19,8 +19,8 @@ use super::{
     errors::Errors,
     library::Library,
     mailbox::Mailbox,
-    messages::{FrameReply, Reply, Size, Stage, Truth, Wanted},
-    picture::{Picture, depth_image, difference, screen},
+    messages::{ErrorsReply, FrameReply, Reply, Size, Stage, Truth, Wanted},
+    picture::{Picture, depth_image, depth_range_m, difference, screen},
     variants::{preview, staged},
 };
 
@@ -131,20 +131,43 @@ impl<'a> Worker<'a> {
             }
             pictures.push(self.picture(sequence, stage, wanted.size, frame)?);
         }
-        let truth = if wanted.truth { Some(Arc::new(self.truth(sequence, wanted.size, frame)?)) } else { None };
-        let mut errors = Vec::new();
-        if wanted.errors {
-            for picture in &pictures {
-                errors.push(self.errors(sequence, wanted.size, picture)?);
+        let mut truths = Vec::new();
+        if wanted.truth {
+            for &stage in &wanted.stages {
+                truths.push(Arc::new(self.truth(sequence, stage, wanted.size, frame)?));
             }
         }
+        let errors = if wanted.errors { self.known_errors(&pictures) } else { Vec::new() };
+        let missing = wanted.errors && errors.is_empty();
         let difference = match (wanted.gain, pictures.as_slice()) {
             (Some(gain), [a, b]) => difference(a.frame.size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain).map(Arc::new),
             _ => None,
         };
         let took = (self.rendered > before).then(|| begun.elapsed());
-        let reply = FrameReply { wanted: wanted.clone(), frame, pictures, truth, errors, difference, took };
+        let reply = FrameReply { wanted: wanted.clone(), frame, pictures: pictures.clone(), truths, errors, difference, took };
         self.speaker.say(Reply::Frame(Box::new(reply)));
+        if missing {
+            self.tell_errors(wanted, sequence, &pictures, mailbox)?;
+        }
+        Ok(())
+    }
+
+    /// What is predicted of pictures that are on show already, unless somebody wants something newer.
+    fn tell_errors(
+        &mut self,
+        wanted: &Wanted,
+        sequence: &Arc<Sequence>,
+        pictures: &[Arc<Picture>],
+        mailbox: &Mailbox<Wanted>,
+    ) -> Result<(), Fault> {
+        let mut errors = Vec::new();
+        for picture in pictures {
+            if mailbox.is_newer() {
+                return Ok(());
+            }
+            errors.push(self.errors(sequence, wanted.size, picture)?);
+        }
+        self.speaker.say(Reply::Errors(Box::new(ErrorsReply { wanted: wanted.clone(), errors })));
         Ok(())
     }
 
@@ -166,23 +189,29 @@ impl<'a> Worker<'a> {
         Ok(picture)
     }
 
-    fn truth(&mut self, sequence: &Arc<Sequence>, size: Size, frame: u64) -> Result<Truth, Fault> {
-        let done = self.render(&variant(sequence, Stage::Photometric, size)?, &[Channel::Color, Channel::Depth], frame)?;
+    fn truth(&mut self, sequence: &Arc<Sequence>, stage: Stage, size: Size, frame: u64) -> Result<Truth, Fault> {
+        let done = self.render(&variant(sequence, stage, size)?, &[Channel::Color, Channel::Depth], frame)?;
         let depth_m = done.frame.depth_m.unwrap_or_default();
-        let image = Arc::new(depth_image(done.frame.size_px, &depth_m));
-        Ok(Truth { depth_m, image })
+        let range_m = depth_range_m(&depth_m);
+        let image = Arc::new(depth_image(done.frame.size_px, &depth_m, range_m));
+        Ok(Truth { depth_m, range_m, image })
+    }
+
+    /// What is predicted of all of the pictures, if all of it was worked out before.
+    fn known_errors(&self, pictures: &[Arc<Picture>]) -> Vec<Arc<Errors>> {
+        let of = |picture| self.kept.iter().find(|kept| Arc::ptr_eq(&kept.picture, picture)).and_then(|kept| kept.errors.clone());
+        pictures.iter().map(of).collect::<Option<Vec<_>>>().unwrap_or_default()
     }
 
     /// What is predicted of a picture, from place to place.
     fn errors(&mut self, sequence: &Arc<Sequence>, size: Size, picture: &Arc<Picture>) -> Result<Arc<Errors>, Fault> {
-        let of_picture = |kept: &&mut Kept| Arc::ptr_eq(&kept.picture, picture);
-        if let Some(errors) = self.kept.iter_mut().find(of_picture).and_then(|kept| kept.errors.clone()) {
+        if let Some(errors) = self.known_errors(std::slice::from_ref(picture)).pop() {
             return Ok(errors);
         }
         let planned = variant(sequence, picture.stage, size)?;
         let map = self.session(&planned, &[Channel::Color])?.planner().error_map(&picture.plan)?;
         let errors = Arc::new(Errors::new(picture, map));
-        if let Some(kept) = self.kept.iter_mut().find(of_picture) {
+        if let Some(kept) = self.kept.iter_mut().find(|kept| Arc::ptr_eq(&kept.picture, picture)) {
             kept.errors = Some(errors.clone());
         }
         Ok(errors)

@@ -19,7 +19,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         return;
     }
     ui.label("Renders frames to files with every channel and format that [output] names, as `camsim render` does.");
-    let id = egui::Id::unique("export folder");
+    // Another scenario's frames go beside that one.
+    let id = egui::Id::unique(("export folder", &document.path));
     let start = || document.path.parent().unwrap_or(std::path::Path::new("")).join("frames").display().to_string();
     let mut folder = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(start);
     let edit = ui.add(egui::TextEdit::singleline(&mut folder).desired_width(f32::INFINITY).hint_text("folder"));

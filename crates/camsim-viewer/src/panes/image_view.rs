@@ -88,12 +88,16 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
     if state.view.overlays.invalid {
         painter.rect_filled(placement.picture_rect(sight.size_px), 0.0, Color32::from_rgb(255, 0, 0));
     }
-    let depth = state.heard.shown.as_ref().and_then(|shown| shown.depth.as_ref()).filter(|_| state.view.overlays.depth);
+    let depth = sight.depth.filter(|_| state.view.overlays.depth).map(|(_, sheet)| sheet);
     let errors = sight.errors.filter(|_| state.view.overlays.error).map(|(_, sheet)| sheet);
     placement.image(&painter, place, depth.or(errors).unwrap_or(sight.sheet), sight.size_px);
     overlays::draw(&painter.with_clip_rect(painter.clip_rect().intersect(placement.rect())), placement, state, &sight);
     let corner = clip.intersect(placement.pane).left_top() + egui::vec2(6.0, 4.0);
-    label(&painter, corner, &format!("{place:?}: {}{}", stage.label(), progress(state, &sight)));
+    label(
+        &painter,
+        corner,
+        &format!("{place:?}: {}{}{}", stage.label(), if depth.is_some() { ", depth" } else { "" }, progress(state, &sight)),
+    );
 }
 
 fn progress(state: &State, sight: &Sight<'_>) -> String {
@@ -102,7 +106,9 @@ fn progress(state: &State, sight: &Sight<'_>) -> String {
         return if done < sight.size_px[1] { format!(", {} of {} rows", done, sight.size_px[1]) } else { String::new() };
     }
     let is_preview = state.heard.shown.as_ref().is_some_and(|shown| shown.reply.wanted.size == Size::Preview);
-    if is_preview { format!(", preview {}x{}", sight.size_px[0], sight.size_px[1]) } else { String::new() }
+    let size = if is_preview { format!(", preview {}x{}", sight.size_px[0], sight.size_px[1]) } else { String::new() };
+    let missing = state.view.overlays.error && sight.errors.is_none();
+    if missing { format!("{size}; predicted error once the hand rests") } else { size }
 }
 
 fn difference(ui: &Ui, state: &State, placement: &Placement) {
@@ -155,7 +161,10 @@ fn wipe_x(state: &State, placement: &Placement) -> f32 {
 fn wipe(ui: &Ui, state: &State, placement: &Placement, out: &mut Outbox) -> bool {
     let x = wipe_x(state, placement);
     let pane = placement.pane;
-    ui.painter().vline(x, pane.y_range(), Stroke::new(2.0, Color32::WHITE));
+    // To be seen on bright ground too.
+    for (width, color) in [(4.0, Color32::from_black_alpha(110)), (2.0, Color32::WHITE)] {
+        ui.painter().vline(x, pane.y_range(), Stroke::new(width, color));
+    }
     let handle = Rect::from_center_size(pos2(x, pane.center().y), egui::vec2(12.0, pane.height()));
     let response = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
     response.widget_info(|| WidgetInfo::slider(true, f64::from(state.view.wipe), "wipe line"));

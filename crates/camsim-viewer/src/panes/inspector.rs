@@ -56,8 +56,7 @@ fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
         fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
         fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");
         fact(ui, "alpha", format!("{a:.0}"), "1 where there is a ray and a source, else 0");
-        let truth = state.heard.shown.as_ref().and_then(|shown| shown.reply.truth.as_ref());
-        if let Some(depth_m) = truth.and_then(|truth| truth.depth_m.get(at / 4)) {
+        if let Some(depth_m) = sight.depth.and_then(|(truth, _)| truth.depth_m.get(at / 4)) {
             fact(ui, "depth, rendered", format!("{depth_m:.3} m"), "as the depth channel has it; 0 = nothing there");
         }
     });
@@ -205,12 +204,16 @@ fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
 /// The predicted error around a pixel, if it is known.
 fn predicted_here(state: &State, [x, y]: [u32; 2]) -> Option<String> {
     let shown = state.heard.shown.as_ref()?;
-    let errors = shown.reply.errors.first()?;
-    let is_preview = shown.reply.wanted.size == crate::engine::Size::Preview;
-    let full = state.heard.sequence()?.scenario.camera.size_px;
-    let factor = if is_preview { crate::engine::preview_factor(full) } else { 1 };
-    let around_px = errors.map.around_px([x / factor, y / factor]);
+    let Some(errors) = shown.reply.errors.first() else {
+        return state.shows_errors().then(|| "once the hand rests".to_owned());
+    };
+    let around_px = errors.map.around_px([x, y]);
     Some(around_px.map_or_else(|| "counted apart: silhouettes around".to_owned(), |px| format!("{px:.5} px")))
+}
+
+/// That a tolerance is broken, if it is; the plan's page says by what.
+fn unless(kept: bool) -> &'static str {
+    if kept { "" } else { ", not kept" }
 }
 
 fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
@@ -229,13 +232,13 @@ fn certainty(ui: &mut Ui, plan: &FramePlan, here: Option<String>) {
         fact(
             ui,
             "predicted error",
-            format!("{:.4} px", predicted.total_px),
+            format!("{:.4} px{}", predicted.total_px, unless(predicted.kept)),
             "of the frame: bound on 99 % of its pixels' source coordinates",
         );
         fact(
             ui,
             "of grey levels",
-            format!("{:.3} of 255", predicted.picture_dn()),
+            format!("{:.3} of 255{}", predicted.picture_dn(), unless(predicted.levels_kept)),
             "expected RMS of the picture, from resampling, blur samples and silhouettes",
         );
         let samples = plan.blur.map_or_else(

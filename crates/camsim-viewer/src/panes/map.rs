@@ -48,7 +48,9 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let models = if chart.boxes.is_empty() && chart.flats.is_empty() { "" } else { ", boards and models in blue" };
     ui.label(format!("{} x {} m, north is up; what the camera sees of the ground in orange{models}", metres(size.y), metres(size.x)));
     let place = pose.position_ned_m;
-    ui.label(format!("camera at {} m north, {} m east, {} m down", fixed(place.x, 1), fixed(place.y, 1), fixed(place.z, 1)));
+    let decimals = if size.max_element() < 20.0 { 3 } else { 1 };
+    let [north, east, down] = place.to_array().map(|m| fixed(m, decimals));
+    ui.label(format!("camera at {north} m north, {east} m east, {down} m down"));
     if let Some(at) = response.interact_pointer_pos().filter(|_| response.clicked())
         && let Some(after_s) = nearest(&chart, |ne| screen(ne).distance_sq(at))
     {

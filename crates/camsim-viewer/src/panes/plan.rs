@@ -1,5 +1,6 @@
 //! The frame's plan: passes with their times, what is left out and why, and how far off the pixels will be.
 
+use camsim_core::plan::Predicted;
 use eframe::egui::{self, RichText, Ui};
 
 use super::widgets::{fact, facts};
@@ -17,10 +18,11 @@ pub fn show(ui: &mut Ui, state: &State) {
     if shown.reply.wanted.size == Size::Preview {
         ui.weak("of the preview; the frame's own plan follows when the hand rests");
     }
+    let has_terrain = state.heard.sequence().is_some_and(|sequence| sequence.scene.terrain.is_some());
     for picture in &shown.reply.pictures {
         ui.strong(format!("frame {}, {}", picture.plan.frame, picture.stage.label()));
         passes(ui, picture);
-        errors(ui, picture);
+        errors(ui, picture, has_terrain);
         skipped(ui, picture);
         ui.separator();
     }
@@ -50,32 +52,71 @@ fn passes(ui: &mut Ui, picture: &Picture) {
     });
 }
 
-fn errors(ui: &mut Ui, picture: &Picture) {
+/// What is predicted, and whether that is what the scenario asks for.
+fn errors(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
     let predicted = &picture.plan.predicted;
-    let kept = if predicted.kept {
-        String::new()
+    if predicted.probes == 0 {
+        verdict(ui, false, Some("no pixel that was tried has a source in the ideal frame: the picture is empty"));
+        return;
+    }
+    facts(ui, &format!("errors {}", picture.stage.label()), |ui| sources(ui, picture, has_terrain));
+    verdict(ui, predicted.kept, predicted.in_the_way.as_deref());
+    facts(ui, &format!("levels {}", picture.stage.label()), |ui| levels(ui, predicted));
+    verdict(ui, predicted.levels_kept, predicted.levels_in_the_way.as_deref());
+    if picture.plan.extrapolated {
+        ui.label(RichText::new("reaches outside the log: extrapolated at constant velocity").color(ui.visuals().warn_fg_color));
+    }
+}
+
+fn verdict(ui: &mut Ui, kept: bool, cause: Option<&str>) {
+    if kept {
+        ui.weak("within the tolerance");
     } else {
-        format!(" - not within the tolerance: {}", predicted.in_the_way.as_deref().unwrap_or(""))
-    };
-    facts(ui, &format!("errors {}", picture.stage.label()), |ui| {
-        fact(
-            ui,
-            "predicted error",
-            format!("{:.4} px{kept}", predicted.total_px),
-            "bound on the 99th percentile of the source coordinate's error",
-        );
-        let parts = [
-            ("lens", predicted.lens_px, "lens inverse"),
-            ("temporal", predicted.temporal_px, "model of the motion"),
-            ("depth", predicted.depth_px, "depth between pixels of the ideal frame"),
-            ("nodes", predicted.nodes_px, "curves between the nodes of the exposure"),
-            ("single precision", predicted.format_px, "poses, depth, coordinates"),
-        ];
-        for (what, px, tip) in parts {
-            fact(ui, what, format!("{px:.5} px"), tip);
-        }
-        fact(ui, "grey levels", format!("{:.3} of 255", predicted.picture_dn()), "expected RMS of the picture");
-    });
+        let text = format!("the tolerance is NOT KEPT: {}", cause.unwrap_or("see camsim explain"));
+        ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
+    }
+}
+
+/// Of source coordinates, by cause.
+fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
+    let plan = &picture.plan;
+    let predicted = &plan.predicted;
+    fact(ui, "predicted error", format!("{:.4} px", predicted.total_px), "bound on the 99th percentile of the source coordinate's error");
+    let parts = [
+        ("lens", predicted.lens_px, "lens inverse"),
+        ("temporal", predicted.temporal_px, "model of the motion"),
+        ("depth", predicted.depth_px, "depth between pixels of the ideal frame"),
+        ("nodes", predicted.nodes_px, "curves between the nodes of the exposure"),
+        ("single precision", predicted.format_px, "poses, depth, coordinates"),
+    ];
+    for (what, px, tip) in parts {
+        fact(ui, what, format!("{px:.5} px"), tip);
+    }
+    if has_terrain {
+        fact(ui, "terrain", format!("{:.3} px", plan.terrain_error_px), "bound on what its level of detail moves; counted apart");
+    }
+    if predicted.silhouette_share > 0.0 {
+        let share = format!("at least {:.1} %", 100.0 * predicted.silhouette_share);
+        fact(ui, "counted apart", share, "pixels at a step or fold of depth: no bound on their source coordinates");
+    }
+    if let Some(holes) = predicted.holes {
+        let text = format!("{:.4} %, {:.2} px wide", 100.0 * holes.share, holes.width_px);
+        fact(ui, "holes", text, "of the picture that no ideal frame sees, behind silhouettes");
+    }
+}
+
+/// Of grey levels, by cause.
+fn levels(ui: &mut Ui, predicted: &Predicted) {
+    fact(ui, "grey levels", format!("{:.3} of 255", predicted.picture_dn()), "expected RMS of the picture, all causes together");
+    fact(ui, "resampling", format!("{:.3}", predicted.resampling_dn), "of the ideal frame, away from silhouettes");
+    fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
+    if let Some(silhouettes) = predicted.silhouettes {
+        fact(ui, "silhouettes", format!("{:.3}", silhouettes.error_dn), "as they are made: by the ideal frame's pixels or by rays");
+    }
+    if let Some(layers) = predicted.layers {
+        let text = format!("{:.3}, {:.0} % of the picture", layers.error_dn, 100.0 * layers.share);
+        fact(ui, "mixed light", text, "of several surfaces, which moves with the depth of one");
+    }
 }
 
 fn skipped(ui: &mut Ui, picture: &Picture) {

@@ -1,6 +1,6 @@
 //! The flight over time: log against tracker, speeds, blur and row skew. The cursor is the timeline's; a click jumps.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use eframe::egui::{self, Color32, Ui};
 use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, VLine};
@@ -8,7 +8,7 @@ use egui_plot::{Corner, HLine, Legend, Line, Plot, PlotPoints, VLine};
 use super::widgets::choice;
 use crate::{
     message::{Message, Outbox},
-    series::{Channel, Series},
+    series::{Channel, Desk},
     state::State,
 };
 
@@ -19,12 +19,13 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         return;
     };
     let id = egui::Id::unique("plot series");
-    let known = ui.data(|data| data.get_temp::<Arc<Series>>(id)).filter(|series| series.is_of(loaded));
-    let series = known.unwrap_or_else(|| {
-        let series = Arc::new(Series::new(loaded));
-        ui.data_mut(|data| data.insert_temp(id, series.clone()));
-        series
-    });
+    let desk = ui.data_mut(|data| data.get_temp_mut_or_default::<Arc<Mutex<Desk>>>(id).clone());
+    let series = desk.lock().unwrap_or_else(PoisonError::into_inner).series(loaded, ui.ctx());
+    let Some(series) = series else {
+        ui.spinner();
+        ui.label("working out errors, speeds and blur along the flight");
+        return;
+    };
     let mut view = state.view.clone();
     ui.horizontal(|ui| {
         for (errors, text, tip) in

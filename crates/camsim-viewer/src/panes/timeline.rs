@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use camsim_core::shutter::Shutter;
+use camsim_core::{sequence::Sequence, shutter::Shutter};
 use camsim_io::load::Loaded;
 use eframe::egui::{self, Color32, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
@@ -17,10 +17,6 @@ use crate::{
 const BAR: f32 = 22.0;
 /// Height of the drawing of the rows' times.
 const ROWS: f32 = 34.0;
-/// Steps between two rows of the log that are marked, seconds of the log.
-const GAP_S: f64 = 1.0;
-/// Gaps that are marked, at most: more would cover the bar.
-const MOST_GAPS: usize = 200;
 
 /// The pane.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -97,10 +93,17 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
         let span = Rect::from_x_y_ranges(x_of(first as f64)..=x_of(end as f64), inner.y_range());
         painter.rect_filled(span, 0.0, ui.visuals().selection.bg_fill.gamma_multiply(0.5));
     }
-    gaps(state, |from, to| {
-        let span = Rect::from_x_y_ranges(x_of(from).max(inner.left())..=x_of(to).min(inner.right()).max(x_of(from) + 1.0), inner.y_range());
-        painter.rect_filled(span, 0.0, ui.visuals().warn_fg_color.gamma_multiply(0.6));
-    });
+    let mut marked = f32::NEG_INFINITY;
+    for [from, to] in gaps(state) {
+        let left = x_of(from.max(0.0));
+        let right = x_of(to.min(last)).max(left + 1.0);
+        // Of thousands within a point one is enough.
+        if right >= marked + 1.0 {
+            let span = Rect::from_x_y_ranges(left..=right, inner.y_range());
+            painter.rect_filled(span, 0.0, ui.visuals().warn_fg_color.gamma_multiply(0.6));
+            marked = right;
+        }
+    }
     let mut marked = f32::NEG_INFINITY;
     for x in repaired(state).map(x_of) {
         // Of thousands side by side a line a point is enough.
@@ -124,21 +127,15 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     response.on_hover_ui(|ui| log_report(ui, state));
 }
 
-/// Spans without rows of the log, in frames.
-fn gaps(state: &State, mut mark: impl FnMut(f64, f64)) {
-    let Some(loaded) = &state.heard.loaded else { return };
-    let (sequence, rows) = (&loaded.sequence, &loaded.log.rows);
-    if loaded.log.report.gaps.count == 0 {
-        return;
-    }
-    let speed = sequence.scenario.flight.speed;
-    let frame_at = |t_s: f64| (t_s - sequence.start_s) * sequence.scenario.camera.fps;
-    let [first_s, last_s] = [0, sequence.frames].map(|frame| sequence.start_s + frame as f64 / sequence.scenario.camera.fps);
-    let from = rows.partition_point(|row| row.t_s < first_s).saturating_sub(1);
-    let to = (rows.partition_point(|row| row.t_s <= last_s) + 1).min(rows.len());
-    let pairs = rows.get(from..to).unwrap_or_default().windows(2);
-    let wide = pairs.filter(|pair| (pair[1].t_s - pair[0].t_s) * speed > GAP_S);
-    wide.take(MOST_GAPS).for_each(|pair| mark(frame_at(pair[0].t_s), frame_at(pair[1].t_s)));
+/// Spans without rows of the log as far as they are on the timeline, in frames, in order.
+fn gaps(state: &State) -> impl Iterator<Item = [f64; 2]> + '_ {
+    let last = state.timeline.last() as f64;
+    let of = |sequence: &'_ Arc<Sequence>| {
+        let sequence = sequence.clone();
+        move |span: &[f64; 2]| span.map(|t_s| (t_s - sequence.start_s) * sequence.scenario.camera.fps)
+    };
+    let spans = state.heard.sequence().into_iter().flat_map(move |sequence| state.heard.gaps_s.iter().map(of(sequence)));
+    spans.filter(move |[from, to]| *to >= 0.0 && *from <= last)
 }
 
 /// Frames at rows of the log that were repaired, in order.
@@ -155,7 +152,11 @@ fn repaired(state: &State) -> impl Iterator<Item = f64> + '_ {
 fn log_report(ui: &mut Ui, state: &State) {
     ui.label("drag to scrub; arrow keys step");
     if let Some(loaded) = &state.heard.loaded {
-        ui.label(loaded.log.report.to_string());
+        let report = loaded.log.report.to_string();
+        // What was repaired is a warning, too.
+        if !loaded.warnings.iter().any(|warning| warning.contains(&report)) {
+            ui.label(report);
+        }
         for warning in &loaded.warnings {
             ui.label(egui::RichText::new(warning).color(ui.visuals().warn_fg_color));
         }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use camsim_core::scenario::BoardSpec;
 use eframe::egui;
 
 use super::harness::demo;
@@ -62,6 +63,34 @@ fn each_kind_of_file_becomes_what_it_is() {
         assert!(state.is_unsaved(), "and it can be undone: {}", path.display());
         send(&mut state, Message::Undo);
         assert!(!toml::to_string(&*state.document.as_ref().expect("open").scenario).expect("text").contains(word), "{}", path.display());
+    }
+}
+
+#[test]
+fn a_target_takes_the_place_of_a_board_that_has_parameters_of_its_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let target = write(
+        folder.path(),
+        "target.yaml",
+        "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 0.06\ncolSpacingMeters: 0.07\n",
+    );
+    for own in ["kind = \"chessboard\"\ncolumns = 9\nrows = 6\nsize_m = 2.0\nmargin_m = 1.0", "target = \"other.yaml\"\nmargin_m = 1.0"] {
+        let mut state = state(Some(demo()));
+        let place = "at = [10.0, 20.0, -30.0]\nangles_deg = [0.0, 90.0, 45.0]";
+        let board: toml::Value = toml::Value::Table(format!("{own}\n{place}").parse().expect("toml"));
+        send(&mut state, Message::Set("scene.board".into(), Some(board), false));
+        let before = state.document.as_ref().expect("open").scenario.clone();
+        assert!(before.scene.board.is_some());
+        drop::take(&mut state, &target);
+        assert!(state.notices.is_empty(), "{:?}", state.notices);
+        let scenario = state.document.as_ref().expect("open").scenario.clone();
+        let board = scenario.scene.board.as_ref().expect("a board");
+        let there = before.scene.board.as_ref().expect("a board");
+        let expected = BoardSpec { target: Some(target.clone()), at: there.at, angles_deg: there.angles_deg, ..BoardSpec::default() };
+        assert_eq!(board, &expected, "what was on the other board is gone, its place stays");
+        camsim_io::board_file::read_board(board).expect("Kalibr's board");
+        send(&mut state, Message::Undo);
+        assert_eq!(state.document.as_ref().expect("open").scenario, before, "in one step");
     }
 }
 

@@ -110,6 +110,17 @@ impl Window {
         self.step();
     }
 
+    /// Lets the window run until a node of that name is there.
+    #[track_caller]
+    pub fn wait_for(&mut self, label: &str) {
+        let begun = Instant::now();
+        while !has(self, label) {
+            assert!(begun.elapsed() < PATIENCE, "{label}: not within {PATIENCE:?}");
+            self.step();
+            let _ = self.repaints.recv_timeout(Duration::from_millis(5));
+        }
+    }
+
     /// Until what is wanted is on show, in full size.
     #[track_caller]
     pub fn settle(&mut self) {

@@ -31,6 +31,7 @@ fn the_inspector_tells_what_the_pixel_sees() {
     assert!(has(&window, &format!("{r} {g} {b}")), "the codes");
     // Asked for with the pixel: what the plan's dry runs around it say, which the oracle's source bears out.
     window.settle_exact();
+    window.wait("its errors", |state| state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty()));
     let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
     let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
     let around_px = map.around_px(pixel).expect("ground");
@@ -64,8 +65,15 @@ fn plan_plots_map_and_export_have_what_they_should() {
     window.click("Plan");
     assert!(has(&window, "- readback"), "the last pass");
     assert!(has(&window, "predicted error"));
+    let is_broken = |window: &Window| window.harness.query_all_by_label_contains("the tolerance is NOT KEPT: ").next().is_some();
+    assert!(!is_broken(&window));
+    send(&mut window, Message::Set("quality.max_error_dn".into(), Some(toml::Value::Float(0.02)), false));
+    window.settle();
+    assert!(is_broken(&window), "grey levels have a tolerance too");
+    send(&mut window, Message::Undo);
+    window.settle();
     window.click("Plots");
-    window.step();
+    window.wait_for("north, m");
     assert!(has(&window, "speed, m/s"));
     window.snapshot("plots", window.page().with_max_y(330.0));
     window.click("Map");
@@ -138,6 +146,20 @@ fn small_large_and_minimised_windows_behave() {
         window.step();
         window.step();
     }
+    // The picture keeps its place: pages, then parameters, go before they would lie on it.
+    for (width, pages, parameters) in [(500.0, false, false), (700.0, false, true), (900.0, true, true), (1000.0, true, true)] {
+        window.harness.set_size(egui::vec2(width, 700.0));
+        (0..3).for_each(|_| window.step());
+        assert_eq!((has(&window, "Export"), has(&window, "camera preset")), (pages, parameters), "at {width}");
+        let picture = window.harness.get_by_label("picture").rect();
+        assert!(picture.width() > 100.0, "{picture} at {width}");
+        if pages {
+            assert!(window.harness.get_by_label("Pixel").rect().left() > picture.right(), "at {width}");
+        }
+        if parameters {
+            assert!(window.harness.get_by_label("camera preset").rect().right() < picture.left(), "at {width}");
+        }
+    }
     // A minimised window gets no passes; the clock then jumps, and play goes on from where it was.
     window.click("play");
     let before = window.state().timeline.frame;
@@ -181,6 +203,10 @@ fn nothing_open_and_a_log_of_ten_hours() {
     for tab in ["Plots", "Map", "Pixel"] {
         window.click(tab);
         window.step();
+        if tab == "Plots" {
+            window.wait_for("north, m");
+        }
     }
+    assert_eq!(window.state().heard.gaps_s, [[4999.0, 5060.0]]);
     assert_eq!(window.state().heard.shown.as_ref().expect("shown").reply.frame, 900_000);
 }

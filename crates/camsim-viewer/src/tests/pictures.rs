@@ -10,6 +10,7 @@ use egui_kittest::kittest::Queryable;
 use super::harness::{Window, demo, pattern};
 use crate::{
     engine::Stage,
+    state::State,
     view::{Compare, Overlays, View},
 };
 
@@ -143,18 +144,40 @@ fn overlays_are_drawn_and_depth_takes_the_place_of_colour() {
         window.state_mut().view.overlays = only;
         // Some are asked for.
         window.settle();
+        window.wait("errors", |state| !only.error || has_errors(state));
         assert_ne!(window.picture(), plain, "{name} shows");
     }
     window.state_mut().view.overlays = overlays;
     window.settle();
-    window.step();
+    window.wait("errors", has_errors);
     let part = window.harness.get_by_label("picture").rect();
     window.snapshot("overlays", egui::Rect::from_center_size(part.center(), egui::vec2(160.0, 120.0)));
+    // On the right of a wipe, too: of two stages the one that takes time is there.
+    let half = View { compare: Compare::Wipe, a: Stage::Ideal, b: Stage::Time, ..View::default() };
+    let [without, with] = [false, true].map(|rows| {
+        window.state_mut().view = View { overlays: Overlays { rows, ..Overlays::default() }, ..half.clone() };
+        window.settle();
+        window.step();
+        window.picture()
+    });
+    let pane = window.harness.get_by_label("picture").rect();
+    let differs = |(x, _, pixel): &(u32, u32, &image::Rgba<u8>)| {
+        f64::from(*x) > f64::from(pane.center().x) + 2.0
+            && f64::from(*x) < f64::from(pane.right())
+            && without.get_pixel(*x, (pane.center().y + 20.0) as u32) != *pixel
+    };
+    let row = (pane.center().y + 20.0) as u32;
+    assert!(with.enumerate_pixels().filter(|(_, y, _)| *y == row).filter(differs).count() >= 5, "row times right of the line");
     window.state_mut().view = View { overlays: Overlays { depth: true, ..Overlays::default() }, ..View::default() };
     window.settle();
-    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truth.clone()).expect("depth");
+    let truth = window.state().heard.shown.as_ref().and_then(|shown| shown.reply.truths.first().cloned()).expect("depth");
     assert_eq!(truth.depth_m.len(), 640 * 480);
     assert!(truth.depth_m.iter().any(|depth| *depth > 100.0));
+}
+
+/// Whether what is predicted of the pictures on show has come.
+fn has_errors(state: &State) -> bool {
+    state.heard.shown.as_ref().is_some_and(|shown| !shown.reply.errors.is_empty() && shown.errors.len() == shown.reply.pictures.len())
 }
 
 #[test]

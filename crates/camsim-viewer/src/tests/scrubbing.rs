@@ -4,12 +4,14 @@ use eframe::egui::{self, Key, PointerButton};
 use egui_kittest::kittest::Queryable;
 
 use super::harness::{Window, demo, shown};
-use crate::engine::Size;
+use crate::{engine::Size, state::State};
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_drag_shows_previews_and_a_resting_hand_the_full_frame() {
     let mut window = Window::open(Some(demo()));
+    // Which must not hold up a preview.
+    window.state_mut().view.overlays.error = true;
     window.settle();
     let bar = window.harness.get_by_label("timeline").rect();
     let at = |share: f32| egui::pos2(bar.left() + 6.0 + share * (bar.width() - 12.0), bar.center().y);
@@ -25,12 +27,16 @@ fn a_drag_shows_previews_and_a_resting_hand_the_full_frame() {
     assert_eq!(window.state().timeline.frame, there);
     window.wait("the preview", |state| shown(state).is_some_and(|wanted| (wanted.frame, wanted.size) == (there, Size::Preview)));
     assert_eq!(window.state().heard.picture().expect("a picture").frame.size_px, [320, 240]);
+    let wanted = window.state().wanted().expect("open");
+    assert!(wanted.size == Size::Preview && !wanted.errors && window.state().heard.shown.as_ref().expect("shown").errors.is_empty());
     window.harness.event(button(false, at(0.5)));
     window.step();
     assert!(!window.state().timeline.dragged);
     window.settle();
     let picture = window.state().heard.picture().expect("a picture");
     assert_eq!((picture.frame.size_px, picture.frame.index), ([640, 480], there));
+    let shown = |state: &State| state.heard.shown.as_ref().map(|shown| (shown.reply.wanted.errors, shown.errors.len()));
+    window.wait("its errors", |state| shown(state) == Some((true, 1)));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 use std::{
     sync::{
         Mutex,
+        atomic::{AtomicU32, Ordering},
         mpsc::{Receiver, channel},
     },
     time::Duration,
@@ -54,6 +55,17 @@ fn with_worker(open: impl Fn() -> Result<Engine, GpuError> + Sync, test: impl Fn
     });
 }
 
+/// Devices of which the first so many are lost before anything is made on them; counts them.
+fn losing(first: u32, opened: &AtomicU32) -> impl Fn() -> Result<Engine, GpuError> + Sync {
+    move || {
+        let engine = Engine::new(AdapterChoice::Best)?;
+        if opened.fetch_add(1, Ordering::Relaxed) < first {
+            engine.gpu().device.destroy();
+        }
+        Ok(engine)
+    }
+}
+
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
@@ -82,20 +94,11 @@ fn a_lost_device_is_told_and_opened_anew_and_the_picture_comes() {
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_device_that_is_lost_while_its_session_is_made_is_told_and_the_frame_comes_from_another() {
-    let opened = Mutex::new(0);
-    let open = || {
-        let engine = Engine::new(AdapterChoice::Best)?;
-        let mut opened = opened.lock().expect("one at a time");
-        *opened += 1;
-        if *opened == 1 {
-            engine.gpu().device.destroy();
-        }
-        Ok(engine)
-    };
-    with_worker(open, |mailbox, replies| {
+    let opened = AtomicU32::new(0);
+    with_worker(losing(1, &opened), |mailbox, replies| {
         mailbox.put(wanted(1));
         let (reply, faults) = next(replies);
-        assert_eq!((reply.frame, *opened.lock().expect("one at a time"), faults.len()), (1, 2, 1), "{faults:?}");
+        assert_eq!((reply.frame, opened.load(Ordering::Relaxed), faults.len()), (1, 2, 1), "{faults:?}");
         match replies.recv_timeout(PATIENCE).expect("a word about it") {
             Reply::Told(text) => assert!(text.contains("lost"), "{text}"),
             other => panic!("{other:?}"),
@@ -106,17 +109,8 @@ fn a_device_that_is_lost_while_its_session_is_made_is_told_and_the_frame_comes_f
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_frame_that_loses_every_device_is_tried_twice_and_the_thread_goes_on() {
-    let opened = Mutex::new(0);
-    let open = || {
-        let engine = Engine::new(AdapterChoice::Best)?;
-        let mut opened = opened.lock().expect("one at a time");
-        *opened += 1;
-        if *opened <= 2 {
-            engine.gpu().device.destroy();
-        }
-        Ok(engine)
-    };
-    with_worker(open, |mailbox, replies| {
+    let opened = AtomicU32::new(0);
+    with_worker(losing(2, &opened), |mailbox, replies| {
         mailbox.put(wanted(0));
         let mut faults = 0;
         while faults < 2 {
@@ -128,7 +122,7 @@ fn a_frame_that_loses_every_device_is_tried_twice_and_the_thread_goes_on() {
         }
         mailbox.put(wanted(1));
         let (reply, more) = next(replies);
-        assert_eq!((reply.frame, more.len(), *opened.lock().expect("one at a time")), (1, 0, 3), "{more:?}");
+        assert_eq!((reply.frame, more.len(), opened.load(Ordering::Relaxed)), (1, 0, 3), "{more:?}");
     });
 }
 

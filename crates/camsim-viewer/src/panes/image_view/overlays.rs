@@ -1,7 +1,7 @@
 //! What is drawn over a picture.
 
 use camsim_core::{camera::CameraModel, plan::ErrorMap};
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 use glam::DVec2;
 
 use super::canvas::Placement;
@@ -37,12 +37,14 @@ pub fn draw(painter: &Painter, placement: &Placement, state: &State, sight: &Sig
     if overlays.rows && sight.stage >= Stage::Time {
         row_times(painter, placement, &sequence.scenario.camera);
     }
-    if overlays.error
+    if overlays.depth
+        && let Some((truth, _)) = sight.depth
+    {
+        depth_scale(painter, truth.range_m);
+    } else if overlays.error
         && let (Some(plan), Some((errors, _))) = (sight.plan, sight.errors)
     {
-        // A preview's pixels are larger.
-        let factor = f64::from(placement.size_px[0]) / f64::from(sight.size_px[0].max(1));
-        error_scale(painter, placement, factor, &errors.map, plan.predicted.total_px);
+        error_scale(painter, &errors.map, plan.predicted.total_px);
     }
 }
 
@@ -107,7 +109,7 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
     let [width, height] = camera.size_px;
     let mids: Vec<f64> = (0..height).map(|y| shutter.dt_pixel_s(width / 2, y)).collect();
     let (first_s, last_s) = mids.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-    let left = placement.rect().left().max(placement.pane.left());
+    let left = painter.clip_rect().left();
     let step = (height / 240).max(1);
     for y in (0..height).step_by(step as usize) {
         let t_s = mids.get(y as usize).copied().unwrap_or_default();
@@ -116,30 +118,49 @@ fn row_times(painter: &Painter, placement: &Placement, camera: &camsim_core::sce
         painter.rect_filled(Rect::from_x_y_ranges(left..=left + 10.0, top..=bottom), 0.0, ramp_color(share));
     }
     for y in [0, height / 4, height / 2, 3 * height / 4, height.saturating_sub(1)] {
-        let seen = placement.rect().intersect(placement.pane).shrink(7.0);
+        let seen = painter.clip_rect().shrink(7.0);
         let at = pos2(left + 13.0, placement.screen(0.0, f64::from(y)).y.clamp(seen.top(), seen.bottom().max(seen.top())));
         let text = format!("{:+.2} ms", 1e3 * mids.get(y as usize).copied().unwrap_or_default());
         painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(11.0), Color32::WHITE);
     }
 }
 
-/// What the colours mean, and the bound for the frame as a whole. `factor`: of the camera's pixels to the picture's.
-fn error_scale(painter: &Painter, placement: &Placement, factor: f64, map: &ErrorMap, total_px: f64) {
-    let largest_px = factor * map.known().map(|(_, px)| px).fold(0.0, f64::max);
-    let seen = placement.rect().intersect(placement.pane);
-    let low = pos2(seen.left() + 6.0, seen.bottom() - 38.0);
-    let ground = Rect::from_min_size(low - vec2(4.0, 4.0), vec2(360.0, 40.0)).intersect(seen);
-    painter.rect_filled(ground, 3.0, Color32::from_black_alpha(170));
-    let step = SCALE[0] / f32::from(SCALE_STEPS);
+/// What the colours mean, and the bound for the frame as a whole.
+fn error_scale(painter: &Painter, map: &ErrorMap, total_px: f64) {
+    let largest_px = map.known().map(|(_, px)| px).fold(0.0, f64::max);
     let least = format!("{:.1e}", largest_px * 10.0_f64.powf(-DECADES));
-    let text = |at: Pos2, text: String| painter.text(at, Align2::LEFT_CENTER, text, FontId::proportional(12.0), Color32::WHITE);
-    let middle = low.y + 0.5 * SCALE[1];
-    let left = text(pos2(low.x, middle), least).right() + 6.0;
+    let most = format!("{largest_px:.1e} px predicted; grey: counted apart");
+    scale(painter, [least, most], &format!("99 % of the frame's pixels within {total_px:.4} px"), |share| share);
+}
+
+fn depth_scale(painter: &Painter, range_m: Option<[f32; 2]>) {
+    let ends = range_m.map_or_else(|| ["nothing".into(), "there".into()], |range_m| range_m.map(|m| format!("{m:.3} m")));
+    scale(painter, ends, "planar depth, by its logarithm", |share| 1.0 - share);
+}
+
+/// Colours from left to right with what they stand for at the ends, and a line below, in the lower left corner of what is seen.
+fn scale(painter: &Painter, ends: [String; 2], below: &str, color: impl Fn(f64) -> f64) {
+    // Of two pictures by a wipe each has its own, on its side of the line.
+    let seen = painter.clip_rect();
+    let low = pos2(seen.left() + 6.0, seen.bottom() - 38.0);
+    let galley = |text: &str| painter.layout_no_wrap(text.to_owned(), FontId::proportional(12.0), Color32::WHITE);
+    let ([least, most], below) = (ends.map(|text| galley(&text)), galley(below));
+    let left = least.size().x + 6.0;
+    let right = left + SCALE[0] + 6.0;
+    let width = (right + most.size().x).max(below.size().x);
+    painter.rect_filled(
+        Rect::from_min_size(low - vec2(4.0, 4.0), vec2(width + 8.0, 40.0)).intersect(seen),
+        3.0,
+        Color32::from_black_alpha(170),
+    );
+    let step = SCALE[0] / f32::from(SCALE_STEPS);
     for i in 0..SCALE_STEPS {
         let share = (f64::from(i) + 0.5) / f64::from(SCALE_STEPS);
-        let rect = Rect::from_min_size(pos2(left + f32::from(i) * step, low.y), vec2(step + 0.5, SCALE[1]));
-        painter.rect_filled(rect, 0.0, ramp_color(share));
+        let rect = Rect::from_min_size(low + vec2(left + f32::from(i) * step, 0.0), vec2(step + 0.5, SCALE[1]));
+        painter.rect_filled(rect, 0.0, ramp_color(color(share)));
     }
-    text(pos2(left + SCALE[0] + 6.0, middle), format!("{largest_px:.1e} px predicted; grey: counted apart"));
-    text(pos2(low.x, low.y + 22.0), format!("99 % of the frame's pixels within {:.4} px", factor * total_px));
+    let middle = |galley: &egui::Galley| 0.5 * (SCALE[1] - galley.size().y);
+    for (at, text) in [(vec2(0.0, middle(&least)), least), (vec2(right, middle(&most)), most), (vec2(0.0, 14.0), below)] {
+        painter.galley(low + at, text, Color32::WHITE);
+    }
 }
