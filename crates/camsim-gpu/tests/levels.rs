@@ -10,7 +10,7 @@ use std::{f64::consts::FRAC_PI_2, sync::Arc};
 use camsim_core::{
     pose::CameraPose,
     reference::{Oracle, RenderOptions},
-    scenario::{Channel, MountSpec},
+    scenario::{Auto, Channel, MountSpec},
     scene::{Encoding, Light, Mesh, MeshVertex, ModelDetail, Scene, SceneLevels, Shape, Texture, Wrap},
 };
 use common::{engine, render, scenario, sequence, steady};
@@ -87,6 +87,8 @@ fn draw(scene: &Scene, max_terrain_error_px: f64) -> (Drawn, Drawn) {
     scenario.camera.focal_px = [FOCAL_PX; 2];
     scenario.camera.mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
     scenario.quality.max_error_dn = 0.5;
+    // Levels are told by pixels of the ideal frame: how fine that is must not depend on what silhouettes cost.
+    scenario.quality.ideal_scale = Auto::Value(2.0);
     scenario.quality.max_terrain_error_px = max_terrain_error_px;
     let sequence = sequence(scenario, steady(HEIGHT_M, 0.0, DVec3::ZERO, DVec3::ZERO), scene.clone());
     let channels = [Channel::Color, Channel::Depth];
