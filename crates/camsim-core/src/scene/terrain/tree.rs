@@ -12,7 +12,7 @@ pub(super) const BLOCK_CELLS: u32 = 4;
 /// Rounding errors of single precision: of a sum of coordinates, as a part of the largest, and of a ray parameter.
 const ROUNDING: f64 = 4e-7;
 const WIDER: f32 = 1e-6;
-/// Levels of a tree at most, by the number of cells, with three nodes that wait on each.
+/// Nodes that wait at most: the root, and three on each level of the largest grid that there can be.
 const MOST_WAITING: usize = 3 * 32 + 1;
 
 /// An implicit quadtree: level 0 holds one box for each 4x4 cells, each level above one for 2x2 of the level below, the last one box.
@@ -154,8 +154,8 @@ impl BlockTree {
         }
     }
 
-    /// The blocks that a ray may meet, each no later than any point of it within the block; the nearest come first, as far as their boxes tell.
-    /// `block` tells how far along the ray others still matter, as a ray parameter.
+    /// Leads a ray to the blocks that it may meet, the nearest first as far as their boxes tell. `block` gets the ray parameter up to which
+    /// anything matters, and returns the one from then on: that of a hit, if it has found one.
     pub fn walk(&self, origin: DVec3, direction: DVec3, t_max: f64, block: &mut dyn FnMut([u32; 2], f64) -> f64) {
         let length = direction.length();
         let ray = self.ray(origin, direction / length);
