@@ -2,10 +2,14 @@
 //! are, has two where that finds one, or none.
 //!
 //! Lines across the picture tell without bias: of borders of length L in an area A, whichever way they run, a line crosses `2 L / (pi A)` for each of
-//! its pixels (Crofton). A row and a column through each probe are looked at thrice a pixel. Two borders within a third
-//! of one are still missed; how many there are is told by those that a look once a pixel would have missed.
+//! its pixels (Crofton). Houses have borders along rows and columns, which lines along those cross less often: 0.79 times. Every other probe
+//! has diagonals, and so the four ways of line cross whatever runs one way 0.95 to 1.03 times as often as that. They are looked at thrice a
+//! pixel. Two borders within a third of one are still missed; how many there are is told by those that a look once a pixel would have missed.
 
-use std::{cell::OnceCell, f64::consts::FRAC_PI_2};
+use std::{
+    cell::OnceCell,
+    f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2},
+};
 
 use glam::DVec2;
 
@@ -36,14 +40,18 @@ pub(super) struct Crossed {
     pub once_a_pixel: f64,
 }
 
+/// The ways that lines run in: along the row and the column of a probe, and along its diagonals.
+const UPRIGHT: [DVec2; 2] = [DVec2::X, DVec2::Y];
+const DIAGONAL: [DVec2; 2] = [DVec2::splat(FRAC_1_SQRT_2), DVec2::new(FRAC_1_SQRT_2, -FRAC_1_SQRT_2)];
+
 impl Search<'_> {
-    /// Along the row and the column of a probe, at its own instant.
-    pub fn crossed(&self, probe: &Probe) -> Crossed {
+    /// Along two lines through a probe, of so many the one of that number, at its own instant.
+    pub fn crossed(&self, number: usize, probe: &Probe) -> Crossed {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
         let (mut borders, mut contrast2, mut flush2, mut feet2, mut once_a_pixel2) = (0, 0.0, 0.0, 0.0, 0.0);
-        for axis in [DVec2::X, DVec2::Y] {
+        for axis in if number.is_multiple_of(2) { UPRIGHT } else { DIAGONAL } {
             let uv = |place: f64| probe.uv + probe.uv_from_px * (APART_PX * (place - 0.5 * (PLACES - 1) as f64) * axis);
             let meet = |place: f64| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
             let met: [_; PLACES] = std::array::from_fn(|k| meet(k as f64));

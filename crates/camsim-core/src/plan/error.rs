@@ -14,6 +14,7 @@ use super::{
     BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     exposure::{MOST_STEPS, miss_px},
+    holes,
     levels::Expected,
     probes::{Probe, spacing_px},
     rounding::Rounding,
@@ -305,9 +306,18 @@ impl<'a> Truths<'a> {
     /// What `keys` do not see.
     pub fn holes(&self, keys: &[KeyFrame], max_error_px: f64) -> Holes {
         let looked = self.looked.par_iter().map(|Looked { probe, truth, .. }| (probe, truth));
-        let camera = &self.reach.camera;
-        let ideal_from_camera = self.trial.ideal.focal_px.x / camera.focal_px.x;
-        Holes::new(&self.trial, looked, keys, ideal_from_camera * spacing_px(camera), max_error_px)
+        Holes::new(&self.trial, looked, keys, self.probe_px(), max_error_px)
+    }
+
+    /// Side of the part of the picture that a probe stands for, ideal pixels.
+    fn probe_px(&self) -> f64 {
+        self.trial.ideal.focal_px.x / self.reach.camera.focal_px.x * spacing_px(&self.reach.camera)
+    }
+
+    /// Mean squared error over the picture by skylines that are elsewhere in an ideal frame, of the linear range; `gain` is that of a pixel.
+    pub fn sky_strips(&self, key: &KeyFrame, gain: &(dyn Fn([u32; 2]) -> f64 + Sync)) -> f64 {
+        let looked: Vec<_> = self.looked.iter().map(|looked| (&looked.probe, &looked.truth)).collect();
+        holes::sky_strips(&self.trial, &looked, key, self.probe_px(), gain)
     }
 
     /// Largest miss of what lies between the depths of the exposure's ends.

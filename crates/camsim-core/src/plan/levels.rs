@@ -238,7 +238,13 @@ impl Prospect<'_> {
         match quality.footprint_taps.value() {
             Some(1) => vec![TapStage::Spline],
             Some(taps) => vec![most(taps)],
-            None => vec![TapStage::Bilinear, TapStage::Spline, most(MOST_TAPS)],
+            // Bilinear reads farther apart than a pixel leave less to be read, and for borders mostly do.
+            None => {
+                let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
+                stages.extend([2, 3, MOST_TAPS].map(most));
+                stages.dedup();
+                stages
+            }
         }
     }
 

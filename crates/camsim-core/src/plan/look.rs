@@ -152,7 +152,8 @@ impl<'a> Look<'a> {
         let gain = &prospect::gain(sequence, &reach.camera);
         let around = contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain }.look_around();
         let least_share = truths.share_apart(|probe| around[probe].is_beside);
-        Some(contours::Outlook::new(&around, truths.holes(&[self.key()], quality.max_error_px), least_share))
+        let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
+        Some(contours::Outlook::new(&around, holes, sky_strips, least_share))
     }
 }
 
