@@ -9,6 +9,8 @@
 //!
 //! Limits are on the lengths of the velocity, acceleration, body rate and angular acceleration vectors.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::Serialize;
 use thiserror::Error;
@@ -57,8 +59,8 @@ pub struct Saturation {
 /// What [`track`] gives.
 #[derive(Clone, Debug)]
 pub struct Tracked {
-    /// The motion.
-    pub trajectory: Trajectory,
+    /// The motion; shared, for of hours of flight it is a gigabyte.
+    pub trajectory: Arc<Trajectory>,
     /// The limits, with `auto` resolved. `linear` and `hold` do not keep them.
     pub limits: ResolvedLimits,
     /// How long the limits were hit; zero for `linear` and `hold`.
@@ -168,7 +170,7 @@ pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerErro
             (Trajectory::uniform(start_s, reference.step_s, end_s, states), saturation)
         }
     };
-    let trajectory = trajectory.ok_or(TrackerError::Overflow)?;
+    let trajectory = Arc::new(trajectory.ok_or(TrackerError::Overflow)?);
     Ok(Tracked { trajectory, limits, saturation, rate_hz: spec.rate_hz })
 }
 

@@ -9,6 +9,7 @@ use camsim_core::camera::CameraModel;
 use camsim_core::scenario::{CameraSpec, LensModel};
 
 mod agisoft;
+mod camodocal;
 pub(crate) mod document;
 mod gyroflow;
 mod kalibr;
@@ -41,8 +42,8 @@ pub enum CameraFileError {
     },
     /// None of the known formats, or several.
     #[error(
-        "{}: {what}; known are OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, the reference program's XML, \
-         Agisoft XML and Gyroflow lens profiles",
+        "{}: {what}; known are OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, camodocal (VINS) YAML, the reference \
+         program's XML, Agisoft XML and Gyroflow lens profiles",
         path.display()
     )]
     Format {
@@ -82,6 +83,8 @@ pub enum CameraFormat {
     Euroc,
     /// ROS `camera_info` YAML.
     RosCameraInfo,
+    /// camodocal YAML, which VINS-Mono and VINS-Fusion read.
+    Camodocal,
     /// XML of the paper's reference program.
     Reference,
     /// Agisoft Metashape, PhotoScan or Lens XML.
@@ -92,8 +95,8 @@ pub enum CameraFormat {
 
 impl CameraFormat {
     /// Every format, in the order of detection.
-    pub const ALL: [Self; 7] =
-        [Self::Reference, Self::Agisoft, Self::Gyroflow, Self::Kalibr, Self::Euroc, Self::RosCameraInfo, Self::OpenCv];
+    pub const ALL: [Self; 8] =
+        [Self::Reference, Self::Agisoft, Self::Gyroflow, Self::Kalibr, Self::Euroc, Self::RosCameraInfo, Self::Camodocal, Self::OpenCv];
 
     /// Its name for people and for `--format`.
     pub fn name(self) -> &'static str {
@@ -102,6 +105,7 @@ impl CameraFormat {
             Self::Kalibr => "kalibr",
             Self::Euroc => "euroc",
             Self::RosCameraInfo => "ros-camera-info",
+            Self::Camodocal => "camodocal",
             Self::Reference => "reference",
             Self::Agisoft => "agisoft",
             Self::Gyroflow => "gyroflow",
@@ -114,6 +118,7 @@ impl CameraFormat {
             Self::Kalibr => kalibr::fits_camchain(document),
             Self::Euroc => kalibr::fits_euroc(document),
             Self::RosCameraInfo => ros::fits(document),
+            Self::Camodocal => camodocal::fits(document),
             Self::Reference => reference::fits(document),
             Self::Agisoft => agisoft::fits(document),
             Self::Gyroflow => gyroflow::fits(document),
@@ -126,6 +131,7 @@ impl CameraFormat {
             Self::Kalibr => kalibr::import_camchain(document),
             Self::Euroc => kalibr::import_euroc(document),
             Self::RosCameraInfo => ros::import(document),
+            Self::Camodocal => camodocal::import(document),
             Self::Reference => reference::import(document),
             Self::Agisoft => agisoft::import(document),
             Self::Gyroflow => gyroflow::import(document),

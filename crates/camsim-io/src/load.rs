@@ -151,7 +151,7 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
         Some((before, _)) => (before.log.clone(), before.sequence.path.trajectory.clone(), before.tracked.clone()),
         None => {
             let (log, tracked) = load_flight(scenario)?;
-            (Arc::new(log), Arc::new(tracked.trajectory.clone()), Arc::new(tracked))
+            (Arc::new(log), tracked.trajectory.clone(), Arc::new(tracked))
         }
     };
     let path = CameraPath::new(trajectory, &scenario.camera.mount)?;

@@ -25,8 +25,8 @@ enum Command {
 
 /// Turn another program's calibration into a CAMERA.toml
 ///
-/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, the reference program's XML, Agisoft XML and Gyroflow lens
-/// profiles. The format is told by content; if several fit, nothing is guessed and --format names the one that is meant.
+/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, camodocal (VINS) YAML, the reference program's XML, Agisoft XML and
+/// Gyroflow lens profiles. The format is told by content; if several fit, nothing is guessed and --format names the one that is meant.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim camera import camchain.yaml -o CAMERA.toml")]
 struct ImportArgs {

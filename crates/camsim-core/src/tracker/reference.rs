@@ -10,12 +10,14 @@ pub(crate) struct Interpolated<'a> {
     rows: &'a [LogRow],
     /// Where the last look-up was; look-ups mostly go forward.
     row: usize,
+    /// The turn from a row to the next one, and that row: many look-ups fall between the same two.
+    turn: Option<(usize, DVec3)>,
 }
 
 impl<'a> Interpolated<'a> {
     /// `None` for a log without rows.
     pub(crate) fn new(rows: &'a [LogRow]) -> Option<Self> {
-        (!rows.is_empty()).then_some(Self { rows, row: 0 })
+        (!rows.is_empty()).then_some(Self { rows, row: 0, turn: None })
     }
 
     /// Position and attitude at `t_s`; outside the log the first or last row.
@@ -29,7 +31,11 @@ impl<'a> Interpolated<'a> {
         let from = &self.rows[self.row];
         let Some(to) = self.rows.get(self.row + 1) else { return (from.position_ned_m, from.ned_from_body) };
         let part = ((t_s - from.t_s) / (to.t_s - from.t_s)).clamp(0.0, 1.0);
-        let turn = so3::log(from.ned_from_body.inverse() * to.ned_from_body);
+        let turn = match self.turn {
+            Some((row, turn)) if row == self.row => turn,
+            _ => so3::log(from.ned_from_body.inverse() * to.ned_from_body),
+        };
+        self.turn = Some((self.row, turn));
         (from.position_ned_m.lerp(to.position_ned_m, part), from.ned_from_body * so3::exp(turn * part))
     }
 
@@ -93,10 +99,10 @@ impl Reference {
         let half = ((0.25 + 0.75 * ticks2).sqrt() - 0.5).round().max(0.0) as usize;
         let raw = Self::sampled_from(log, start_s, step_s, PASSES * half, count + 2 * PASSES * half);
         let (mut position, mut attitude) = (raw.position_ned_m, raw.ned_from_body);
-        for _ in 0..PASSES {
-            position = moving_average(&position, half);
-            attitude = average_attitude(&attitude, half);
-        }
+        rayon::join(
+            || (0..PASSES).for_each(|_| moving_average(&mut position, half)),
+            || (0..PASSES).for_each(|_| average_attitude(&mut attitude, half)),
+        );
         Self { step_s, position_ned_m: position, ned_from_body: attitude }
     }
 
@@ -122,37 +128,39 @@ impl Reference {
 /// Number of moving averages: four give a kernel with two continuous derivatives.
 const PASSES: usize = 4;
 
-/// Means over `2 half + 1` values; the result is shorter by `2 half`. The running sum carries the rounding of each step, so values
-/// are taken relative to the first one.
-fn moving_average(values: &[DVec3], half: usize) -> Vec<DVec3> {
+/// Means over `2 half + 1` values in place of them; there are `2 half` fewer. The running sum carries the rounding of each step, so values
+/// are taken relative to the first one. In place, because of hours of flight the system takes longer to hand out memory than this takes.
+fn moving_average(values: &mut Vec<DVec3>, half: usize) {
     let width = 2 * half + 1;
-    let Some(&base) = values.first() else { return Vec::new() };
+    let Some(&base) = values.first() else { return };
     let mut sum: DVec3 = values.iter().take(width - 1).map(|value| *value - base).sum();
-    let mut means = Vec::with_capacity(values.len().saturating_sub(2 * half));
-    for (leaving, entering) in values.iter().zip(values.iter().skip(width - 1)) {
-        sum += *entering - base;
-        means.push(base + sum / width as f64);
-        sum -= *leaving - base;
+    let count = values.len().saturating_sub(2 * half);
+    for k in 0..count {
+        let (leaving, entering) = (values[k], values[k + 2 * half]);
+        sum += entering - base;
+        values[k] = base + sum / width as f64;
+        sum -= leaving - base;
     }
-    means
+    values.truncate(count);
 }
 
-/// Normalised mean quaternions. Exact for a constant rate, otherwise an error of third order in the angle that the window spans.
+/// Normalised mean quaternions, in place too. Exact for a constant rate, otherwise an error of third order in the angle that the window spans.
 /// Where the log turns so fast that the mean says nothing, the attitude stays as it is.
-fn average_attitude(values: &[DQuat], half: usize) -> Vec<DQuat> {
+fn average_attitude(values: &mut Vec<DQuat>, half: usize) {
     let width = 2 * half + 1;
     let components = |q: &DQuat| DVec4::new(q.x, q.y, q.z, q.w);
     let mut sum: DVec4 = values.iter().take(width - 1).map(components).sum();
-    let mut means: Vec<DQuat> = Vec::with_capacity(values.len().saturating_sub(2 * half));
-    for (k, (leaving, entering)) in values.iter().zip(values.iter().skip(width - 1)).enumerate() {
-        sum += components(entering);
+    let count = values.len().saturating_sub(2 * half);
+    for k in 0..count {
+        let (leaving, entering) = (values[k], values[k + 2 * half]);
+        sum += components(&entering);
         let mean = sum / width as f64;
         let length = mean.length();
         let mean = if length > 0.5 { DQuat::from_vec4(mean / length) } else { values[k + half] };
-        means.push(if means.last().is_some_and(|before| before.dot(mean) < 0.0) { -mean } else { mean });
-        sum -= components(leaving);
+        values[k] = if k > 0 && values[k - 1].dot(mean) < 0.0 { -mean } else { mean };
+        sum -= components(&leaving);
     }
-    means
+    values.truncate(count);
 }
 
 #[cfg(test)]
@@ -203,5 +211,57 @@ mod tests {
         let gained = reference.position_ned_m[2000].x - (2000.0 * 0.001 - 0.0005 - 2.0f64).powi(2);
         // The half width is a whole number of ticks: 1 % at 1 ms.
         assert!((gained - 0.01).abs() < 2e-4, "{gained}");
+    }
+
+    /// As the formulas stand, into a new list: the sums in the same order.
+    fn averages_written_out(positions: &[DVec3], attitudes: &[DQuat], half: usize) -> (Vec<DVec3>, Vec<DQuat>) {
+        let (width, base) = (2 * half + 1, positions[0]);
+        let mut sum: DVec3 = positions.iter().take(width - 1).map(|value| *value - base).sum();
+        let mut of_positions = Vec::new();
+        for window in positions.windows(width) {
+            sum += window[width - 1] - base;
+            of_positions.push(base + sum / width as f64);
+            sum -= window[0] - base;
+        }
+        let mut sum: DVec4 = attitudes.iter().take(width - 1).map(|q| DVec4::from_array(q.to_array())).sum();
+        let mut of_attitudes: Vec<DQuat> = Vec::new();
+        for window in attitudes.windows(width) {
+            sum += DVec4::from_array(window[width - 1].to_array());
+            let mean = sum / width as f64;
+            let mean = if mean.length() > 0.5 { DQuat::from_vec4(mean / mean.length()) } else { window[half] };
+            let turned = of_attitudes.last().is_some_and(|before| before.dot(mean) < 0.0);
+            of_attitudes.push(if turned { -mean } else { mean });
+            sum -= DVec4::from_array(window[0].to_array());
+        }
+        (of_positions, of_attitudes)
+    }
+
+    #[test]
+    fn averages_in_place_are_those_of_a_new_list_to_the_last_bit() {
+        // Slow turns, and turns so fast that a window's mean is next to nothing.
+        for (rate, half) in [(0.01, 0), (0.01, 7), (0.9, 7), (2.3, 3), (0.01, 150), (0.01, 200)] {
+            let at = |k: i32| f64::from(k);
+            let mut positions: Vec<DVec3> = (0..301).map(|k| DVec3::new(1e5 + at(k).sin(), at(k * k) * 0.37, -at(k).sqrt())).collect();
+            let axis = DVec3::new(0.6, -0.48, 0.64);
+            let mut attitudes: Vec<DQuat> = (0..301).map(|k| DQuat::from_axis_angle(axis, rate * at(k) + 0.2 * at(k).cos())).collect();
+            let expected = averages_written_out(&positions, &attitudes, half);
+            moving_average(&mut positions, half);
+            average_attitude(&mut attitudes, half);
+            assert_eq!(positions.len(), 301_usize.saturating_sub(2 * half));
+            assert!((positions, attitudes) == expected, "{rate} rad a tick, {half} ticks");
+        }
+        moving_average(&mut Vec::new(), 2);
+        average_attitude(&mut Vec::new(), 2);
+    }
+
+    #[test]
+    fn a_look_up_does_not_depend_on_the_one_before() {
+        let rows: Vec<_> = (0..20).map(|i| row(f64::from(i), f64::from(i * i), 0.3 * f64::from(i))).collect();
+        let mut log = Interpolated::new(&rows).unwrap();
+        for k in 0..400 {
+            // To and fro, often between the same two rows.
+            let t_s = 9.5 + 11.0 * (f64::from(k) * 0.05).sin();
+            assert_eq!(log.at(t_s), Interpolated::new(&rows).unwrap().at(t_s), "{t_s}");
+        }
     }
 }

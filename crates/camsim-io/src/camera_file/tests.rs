@@ -218,3 +218,32 @@ fn published_files() {
     eprintln!("{imported} imported, {refused} refused");
     assert!(imported >= 60, "{imported} imported, {refused} refused");
 }
+
+#[test]
+fn camodocal() {
+    let pinhole = "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   \
+                   k1: -0.295\n   k2: 0.0866\n   p1: 2.0e-06\n   p2: 1.4e-05\nprojection_parameters:\n   fx: 461.1\n   fy: 459.7\n   cx: 362.6\n   cy: 248.5\n";
+    let imported = import("cam0_pinhole.yaml", pinhole).unwrap();
+    assert_eq!(imported.format, CameraFormat::Camodocal);
+    let spec = &imported.spec;
+    assert_eq!((spec.size_px, spec.focal_px, spec.principal_point_px), ([752, 480], [461.1, 459.7], Some([362.6, 248.5])));
+    assert_eq!((spec.lens.model, spec.lens.coefficients.as_slice()), (LensModel::BrownConrady, &[-0.295, 0.0866, 2e-6, 1.4e-5][..]));
+    // TUM VI's first camera as VINS has it, whose numbers are those of the data set's own Kalibr file (equidistant).
+    let fisheye = "%YAML:1.0\nimu_topic: \"/imu0\"\nmodel_type: KANNALA_BRANDT\nimage_width: 512\nimage_height: 512\nprojection_parameters:\n   \
+                   k2: 0.0034823894022493434\n   k3: 0.0007150348452162257\n   k4: -0.0020532361418706202\n   k5: 0.00020293673591811182\n   \
+                   mu: 190.97847715128717\n   mv: 190.9733070521226\n   u0: 254.93170605935475\n   v0: 256.8974428996504\n\
+                   extrinsicRotation: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [ 0, 0, -1 ]\n";
+    let kalibr = "cam0:\n  camera_model: pinhole\n  distortion_model: equidistant\n  resolution: [512, 512]\n  \
+                  distortion_coeffs: [0.0034823894022493434, 0.0007150348452162257, -0.0020532361418706202, 0.00020293673591811182]\n  \
+                  intrinsics: [190.97847715128717, 190.9733070521226, 254.93170605935475, 256.8974428996504]\n";
+    assert_eq!(import("tum_config.yaml", fisheye).unwrap().spec, import("camchain.yaml", kalibr).unwrap().spec);
+    for (name, from, to, told) in [
+        ("mirror", "PINHOLE", "MEI", "model_type: is `MEI`"),
+        ("missing", "   fx: 461.1\n", "", "projection_parameters.fx: is missing"),
+        ("no size", "image_width: 752\n", "", "image_width: is missing"),
+        ("no number", "k1: -0.295", "k1: nan", "distortion_parameters.k1"),
+    ] {
+        let error = import("cam.yaml", &pinhole.replace(from, to)).unwrap_err().to_string();
+        assert!(error.contains(told), "{name}: {error}");
+    }
+}
