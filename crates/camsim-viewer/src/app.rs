@@ -87,8 +87,8 @@ impl Viewer {
     pub fn show(&mut self, ui: &mut egui::Ui) {
         let context = ui.ctx().clone();
         self.listen(&context);
+        panes::shortcuts::listen(&context, &mut self.state);
         let mut out = Outbox::new();
-        panes::shortcuts::listen(&context, &self.state, &mut out);
         take_drops(&context, &mut out);
         self.guard_close(&context, &mut out);
         out.extend(self.state.browsed());

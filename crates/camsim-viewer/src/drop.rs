@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use camsim_io::{camera_file::import_camera, scenario_file::read_checked_camera};
+use camsim_core::scenario::{CameraSpec, PhotometricSpec};
+use camsim_io::{camera_file::import_camera_as, scenario_file::read_checked_camera};
 use toml::{Table, Value};
 
 use crate::{
@@ -50,7 +51,7 @@ pub fn take(state: &mut State, path: &Path) {
         "toml" if state.is_unsaved() => state.leaving = Some(Leaving::For(path.into())),
         "toml" => state.open(path.into()),
         "yaml" | "yml" if is_target(path) => target(state, path),
-        "yaml" | "yml" | "xml" | "json" => camera(state, import_camera(path).map_err(|error| error.to_string())),
+        "yaml" | "yml" | "xml" | "json" => calibration(state, path),
         "csv" | "txt" | "tum" | "log" => set(state, "flight.log", path),
         "png" | "jpg" | "jpeg" | "bmp" | "gif" | "pgm" | "ppm" => {
             if state.document.is_none() {
@@ -136,7 +137,30 @@ fn model(state: &mut State, path: &Path) {
     after(state, told);
 }
 
-fn camera(state: &mut State, read: Result<camsim_core::scenario::CameraSpec, String>) {
+/// Another program's calibration: what it does not tell of shutter and light stays, but for the other lens's vignette. What was left out or chosen is told.
+fn calibration(state: &mut State, path: &Path) {
+    let imported = match import_camera_as(path, None) {
+        Ok(imported) => imported,
+        Err(error) => return state.notice(error.to_string()),
+    };
+    let mut spec = imported.spec;
+    if let Some(document) = &state.document {
+        let (now, untold) = (&document.scenario.camera, CameraSpec::default());
+        if spec.shutter == untold.shutter {
+            spec.shutter = now.shutter.clone();
+        }
+        if spec.photometric == untold.photometric {
+            let PhotometricSpec { vignette, vignette_thresholds, .. } = untold.photometric;
+            spec.photometric = PhotometricSpec { vignette, vignette_thresholds, ..now.photometric.clone() };
+        }
+        // Frame rate and shutter are the scenario's here.
+        let told = imported.notes.iter().filter(|note| !note.contains("fps is 30") && !note.contains("shutter is global"));
+        told.for_each(|note| state.notice(format!("{}: {note}", path.display())));
+    }
+    camera(state, Ok(spec));
+}
+
+fn camera(state: &mut State, read: Result<CameraSpec, String>) {
     let told = match (&mut state.document, read) {
         (Some(document), Ok(camera)) => document.set_camera(&camera),
         (None, Ok(_)) => Err("open a scenario first; the calibration then becomes its camera".to_owned()),

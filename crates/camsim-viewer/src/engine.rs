@@ -35,6 +35,7 @@ pub struct Handle {
     previews: Arc<Mailbox<Wanted>>,
     frames: Arc<Mailbox<Wanted>>,
     exact: Arc<Mailbox<ExactWanted>>,
+    library: Arc<Library>,
     replies: Receiver<Reply>,
 }
 
@@ -72,11 +73,12 @@ impl Handle {
         }
         let (mailbox, voice) = (exact.clone(), speaker.clone());
         spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice));
-        Self { previews, frames, exact, replies }
+        Self { previews, frames, exact, library, replies }
     }
 
     /// Replaces what is wanted of the renderer.
     pub fn want(&self, wanted: Wanted) {
+        self.library.announce(wanted.reading);
         match wanted.size {
             Size::Preview => {
                 self.frames.clear();

@@ -8,6 +8,7 @@ use std::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
+    time::Instant,
 };
 
 use camsim_core::scenario::Scenario;
@@ -23,6 +24,7 @@ pub struct ExportJob {
     pub frames: [u64; 2],
     cancelled: AtomicBool,
     progress: Mutex<Progress>,
+    begun: Instant,
     repaint: Option<eframe::egui::Context>,
 }
 
@@ -41,7 +43,8 @@ pub type Exporter = Arc<dyn Fn(&ExportJob) -> Result<String, String> + Send + Sy
 impl ExportJob {
     /// A job that nobody has started.
     pub fn new(scenario: Scenario, folder: PathBuf, frames: [u64; 2]) -> Self {
-        Self { scenario, folder, frames, cancelled: AtomicBool::new(false), progress: Mutex::default(), repaint: None }
+        let (cancelled, progress) = (AtomicBool::new(false), Mutex::default());
+        Self { scenario, folder, frames, cancelled, progress, begun: Instant::now(), repaint: None }
     }
 
     /// Starts `exporter` on its own thread.
@@ -85,6 +88,13 @@ impl ExportJob {
     /// How far it is.
     pub fn progress(&self) -> Progress {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Seconds that the rest will take if it goes on as it went so far; `None` before the second frame: the first takes what is done once, too.
+    pub fn left_s(&self) -> Option<f64> {
+        let done = self.progress().done;
+        let left = (self.frames[1] - self.frames[0]).checked_sub(done)?;
+        (done >= 2).then(|| left as f64 * self.begun.elapsed().as_secs_f64() / done as f64)
     }
 
     fn end(&self, ended: Result<String, String>) {

@@ -6,6 +6,7 @@ use camsim_core::{
     camera::CameraModel,
     pose::CameraPose,
     reference::{Look, Oracle},
+    scenario::CameraSpec,
 };
 use glam::{DVec2, DVec3};
 
@@ -47,12 +48,24 @@ pub fn paths(looks: &Arc<Oracle>, frame: u64) -> Arc<Vec<PixelPath>> {
 pub fn path(looks: &Oracle, frame: u64, pixel: [u32; 2]) -> Option<PixelPath> {
     let look = looks.look(frame, pixel, DVec2::ZERO, 0.0)?;
     let sequence = looks.sequence();
-    let camera = CameraModel::from_spec(&sequence.scenario.camera).ok()?;
+    let camera = camera_of(&sequence.scenario.camera)?;
     let at = |t_s: f64| project(&camera, &sequence.path.pose(t_s), &look);
     let exposure_s = 1e-3 * sequence.scenario.camera.shutter.exposure_ms;
     let phases = (0..POINTS).map(|k| f64::from(k) / f64::from(POINTS - 1) - 0.5);
     let exposure_px = if exposure_s > 0.0 { phases.filter_map(|phase| at(look.t_s + phase * exposure_s)).collect() } else { Vec::new() };
     Some(PixelPath { pixel: DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])), at_stamp_px: at(looks.stamp_s(frame)), exposure_px })
+}
+
+/// A camera, made once: where its lens folds takes milliseconds to find, and panes ask with each pass. `None` for one that cannot be rendered.
+pub fn camera_of(spec: &CameraSpec) -> Option<Arc<CameraModel>> {
+    static KEPT: Mutex<Option<(CameraSpec, Arc<CameraModel>)>> = Mutex::new(None);
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, camera)) = kept.as_ref().filter(|(of, _)| of == spec) {
+        return Some(camera.clone());
+    }
+    let camera = Arc::new(CameraModel::from_spec(spec).ok()?);
+    *kept = Some((spec.clone(), camera.clone()));
+    Some(camera)
 }
 
 /// Where what a look sees is in the picture of another pose; the sky by its direction.

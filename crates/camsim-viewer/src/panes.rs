@@ -54,7 +54,29 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
         image_view::show(ui, state, out);
     });
     menu::windows(ui.ctx(), state, out);
+    hovering(ui.ctx());
     shortcuts::window(ui.ctx(), state, out);
+}
+
+/// Files that a hand holds over the window: that they can be dropped, and which.
+fn hovering(context: &egui::Context) {
+    let names: Vec<String> = context.input(|input| {
+        let of = |path: &std::path::PathBuf| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        input.raw.hovered_files.iter().filter_map(|file| file.path.as_ref().and_then(of)).collect()
+    });
+    if names.is_empty() {
+        return;
+    }
+    let id = egui::Id::unique("files over the window");
+    context.layer_painter(egui::LayerId::new(egui::Order::Foreground, id)).rect_filled(
+        context.content_rect(),
+        0.0,
+        egui::Color32::from_black_alpha(150),
+    );
+    let text = format!("drop to open or use {}", names.join(", "));
+    egui::Area::new(id).order(egui::Order::Foreground).anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO).show(context, |ui| {
+        ui.label(egui::RichText::new(text).size(20.0).color(egui::Color32::WHITE));
+    });
 }
 
 fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {

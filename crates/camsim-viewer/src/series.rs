@@ -1,26 +1,42 @@
-//! Numbers over the flight, for plots.
+//! Numbers over the flight, for plots: all of it in few points, and a part of it closer for whoever looks there.
 
 mod desk;
+mod errors;
+mod instants;
 
 use std::sync::{Arc, Weak};
 
-use camsim_core::flight_log::FlightLog;
+use camsim_core::{
+    flight_log::{FlightLog, LogRow},
+    trajectory::so3,
+};
 use camsim_io::load::Loaded;
 pub use desk::Desk;
 use glam::{DQuat, DVec3, EulerRot};
 
-/// Instants of a line: more than a plot has points across.
+use self::{
+    errors::{Errors, digits, shorter_deg},
+    instants::{Instants, thinned},
+};
+
+/// Steps of a line: more than a plot has points across.
 const POINTS: u64 = 800;
-/// Instants between two of them that errors are looked for at, at most: every row of a log of 40 Hz over 1000 s.
-const MOST_BETWEEN: u64 = 50;
+/// Rows of the log within a closer look that have a point of their own, at most.
+const MOST_ROWS: usize = 1600;
+/// Plots that compare log and tracker.
+const AXES: [&str; 6] = ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg"];
 
 /// What is plotted, over path time.
 #[derive(Clone, Debug)]
 pub struct Series {
     of: Weak<Loaded>,
     log: Weak<FlightLog>,
-    /// Path time of the window's beginning.
-    pub start_s: f64,
+    /// Path time of the window's beginning, and of its end.
+    pub span_s: [f64; 2],
+    /// Where it is worked out closer, if it is anywhere.
+    pub closer_s: Option<[f64; 2]>,
+    /// Instants of the log's rows there; empty if there are too many.
+    pub rows_s: Vec<f64>,
     /// One plot each.
     pub channels: Vec<Channel>,
 }
@@ -30,7 +46,7 @@ pub struct Series {
 pub struct Channel {
     /// What, with its unit.
     pub name: &'static str,
-    /// What there is to say beside it.
+    /// What there is to say beside it, of the whole flight.
     pub note: String,
     /// Lines with their names, `[t_s, value]`.
     pub lines: Vec<(&'static str, Vec<[f64; 2]>)>,
@@ -40,42 +56,67 @@ pub struct Channel {
     pub error: Option<Vec<[f64; 2]>>,
 }
 
+impl Channel {
+    /// Leaves of each step the least and the largest value.
+    fn thin(&mut self, instants: &Instants) {
+        let of_ground = self.lines.first().is_some_and(|(_, points)| points.len() == instants.of_ground.len());
+        let for_each = if of_ground { instants.for_each_of_ground } else { instants.for_each };
+        self.lines.iter_mut().for_each(|(_, points)| *points = thinned(std::mem::take(points), for_each));
+    }
+}
+
 impl Series {
     /// Over the window of a scenario.
     pub fn new(loaded: &Arc<Loaded>) -> Self {
         let sequence = &loaded.sequence;
-        let span_s = sequence.frames.max(2) as f64 / sequence.scenario.camera.fps;
-        let times: Vec<f64> = (0..=POINTS).map(|k| sequence.start_s + span_s * k as f64 / POINTS as f64).collect();
-        let over = |value: &dyn Fn(f64) -> f64| times.iter().map(|&t_s| [t_s, value(t_s)]).collect::<Vec<_>>();
-        let state = |t_s: f64| sequence.path.trajectory.state(t_s);
-        let (limits, camera) = (&loaded.tracked.limits, &sequence.scenario.camera);
-        let mut channels = Vec::new();
-        let errors = errors(loaded, span_s);
-        for (axis, name) in ["north, m", "east, m", "down, m", "roll, deg", "pitch, deg", "yaw, deg"].into_iter().enumerate() {
-            let of_log = over(&|t_s| of_log(loaded, t_s)[axis]);
-            let tracked = over(&|t_s| of_tracker(loaded, t_s)[axis]);
-            let Errors { rms, largest, points } = errors[axis].clone();
-            let (unit, is_angle) = if axis < 3 { ("m", false) } else { ("deg", true) };
-            let note = format!("error {} {unit} RMS, {} at most", digits(rms), digits(largest));
-            let lines = [("log", of_log), ("tracker", tracked)];
-            let lines = lines.into_iter().map(|(name, points)| (name, if is_angle { continuous(points) } else { points })).collect();
-            channels.push(Channel { name, note, lines, limit: None, error: Some(points) });
+        let start_s = sequence.start_s;
+        let span_s = [start_s, start_s + sequence.frames.max(2) as f64 / sequence.scenario.camera.fps];
+        let instants = Instants::of(span_s, rows_within(&loaded.log, span_s).len(), &[]);
+        let mut channels = channels(loaded, &instants);
+        for (axis, channel) in channels.iter_mut().take(AXES.len()).enumerate() {
+            let unit = if is_angle(axis) { "deg" } else { "m" };
+            let error = Errors::of(&differences(channel), instants.for_each);
+            channel.note = format!("error {} {unit} RMS, {} at most", digits(error.rms), digits(error.largest));
+            channel.error = Some(error.points);
         }
-        let mut plain = |name: &'static str, points: Vec<[f64; 2]>, limit: Option<f64>| {
-            let largest = points.iter().map(|point| point[1]).fold(0.0, f64::max);
-            channels.push(Channel { name, note: format!("up to {largest:.3}"), lines: vec![(name, points)], limit, error: None });
-        };
-        let spec = &sequence.scenario.tracker;
-        plain("speed, m/s", over(&|t_s| state(t_s).velocity_ned_m_s.length()), Some(limits.max_speed_m_s));
-        plain("acceleration, m/s2", over(&|t_s| state(t_s).acceleration_ned_m_s2.length()), Some(spec.max_acceleration_m_s2));
-        let rate_limit = limits.max_angular_rate_rad_s.to_degrees();
-        plain("body rate, deg/s", over(&|t_s| state(t_s).rate_body_rad_s.length().to_degrees()), Some(rate_limit));
-        let focal_px = 0.5 * (camera.focal_px[0] + camera.focal_px[1]);
-        let (exposure_s, readout_s) = (1e-3 * camera.shutter.exposure_ms, 1e-3 * camera.shutter.readout_ms);
-        let image_speed = |t_s: f64| image_speed_px_s(loaded, focal_px, t_s);
-        plain("blur in the middle, px", over(&|t_s| image_speed(t_s) * exposure_s), None);
-        plain("row skew in the middle, px", over(&|t_s| image_speed(t_s) * readout_s), None);
-        Self { of: Arc::downgrade(loaded), log: Arc::downgrade(&loaded.log), start_s: sequence.start_s, channels }
+        let attitude = &mut channels[AXES.len()];
+        let error = Errors::of(&attitude.lines[0].1, instants.for_each);
+        attitude.note = format!("{} RMS, {} at most", digits(error.rms), digits(error.largest));
+        let largest = largest_motion(loaded, span_s);
+        for (channel, of_knots) in channels[AXES.len() + 1..].iter_mut().zip(largest.into_iter().map(Some).chain([None, None])) {
+            let of_points = channel.lines.iter().flat_map(|(_, points)| points).map(|point| point[1]).fold(0.0, f64::max);
+            channel.note = match of_knots {
+                Some(largest) => format!("up to {:.3}", largest.max(of_points)),
+                None => format!("up to about {of_points:.3}"),
+            };
+        }
+        channels.iter_mut().for_each(|channel| channel.thin(&instants));
+        Self { of: Arc::downgrade(loaded), log: Arc::downgrade(&loaded.log), span_s, closer_s: None, rows_s: Vec::new(), channels }
+    }
+
+    /// The same with a part of the window worked out in [`POINTS`] steps, and at each row of the log unless there are many. What is said of the whole flight
+    /// stays.
+    pub fn closer(&self, loaded: &Arc<Loaded>, part_s: [f64; 2]) -> Self {
+        let part_s = part_s.map(|t_s| t_s.clamp(self.span_s[0], self.span_s[1]));
+        let rows = rows_within(&loaded.log, part_s);
+        let rows_s: Vec<f64> = if rows.len() > MOST_ROWS { Vec::new() } else { rows.iter().map(|row| row.t_s).collect() };
+        let instants = Instants::of(part_s, rows.len(), &rows_s);
+        let mut channels = channels(loaded, &instants);
+        for (axis, (channel, whole)) in channels.iter_mut().zip(&self.channels).enumerate() {
+            channel.note.clone_from(&whole.note);
+            if let Some(error) = &whole.error {
+                channel.error = Some(around(error, part_s, Errors::of(&differences(channel), instants.for_each).points));
+            }
+            channel.thin(&instants);
+            let mut lines: Vec<_> = whole.lines.clone();
+            if is_angle(axis) && axis < AXES.len() {
+                [&mut lines, &mut channel.lines].into_iter().for_each(|lines| less_turns(lines, 0.5 * (part_s[0] + part_s[1])));
+            }
+            for ((_, points), (_, whole)) in channel.lines.iter_mut().zip(lines) {
+                *points = around(&whole, part_s, std::mem::take(points));
+            }
+        }
+        Self { closer_s: Some(part_s), rows_s, channels, ..self.clone() }
     }
 
     /// Whether it is of this.
@@ -89,52 +130,85 @@ impl Series {
     }
 }
 
-/// Three decimals, or for what is small three digits.
-fn digits(value: f64) -> String {
-    let zeros = if value == 0.0 { 0.0 } else { (-value.abs().log10()).floor().clamp(0.0, 5.0) };
-    format!("{value:.*}", 3 + zeros as usize)
+fn is_angle(axis: usize) -> bool {
+    axis >= 3
 }
 
-/// How far the tracker is from the log.
-#[derive(Clone, Debug, Default)]
-struct Errors {
-    rms: f64,
-    largest: f64,
-    points: Vec<[f64; 2]>,
+fn is_within(t_s: f64, [from_s, to_s]: [f64; 2]) -> bool {
+    t_s >= from_s && t_s <= to_s
 }
 
-impl Errors {
-    /// From errors in order of time, so many for each point.
-    fn of(errors: &[[f64; 2]], for_each: usize) -> Self {
-        let larger = |a: [f64; 2], b: [f64; 2]| if b[1].abs() > a[1].abs() { b } else { a };
-        let points: Vec<[f64; 2]> = errors.chunks(for_each.max(1)).filter_map(|part| part.iter().copied().reduce(larger)).collect();
-        let squares: f64 = errors.iter().map(|error| error[1] * error[1]).sum();
-        let largest = points.iter().map(|point| point[1].abs()).fold(0.0, f64::max);
-        Self { rms: (squares / errors.len().max(1) as f64).sqrt(), largest, points }
-    }
+fn rows_within(log: &FlightLog, [from_s, to_s]: [f64; 2]) -> &[LogRow] {
+    let [first, end] = [log.rows.partition_point(|row| row.t_s < from_s), log.rows.partition_point(|row| row.t_s <= to_s)];
+    &log.rows[first..end]
 }
 
-/// North, east, down, roll, pitch, yaw.
-fn errors(loaded: &Loaded, span_s: f64) -> [Errors; 6] {
-    let start_s = loaded.sequence.start_s;
-    let rows = loaded.log.rows.iter().filter(|row| row.t_s >= start_s && row.t_s <= start_s + span_s).count() as u64;
-    let between = (rows / POINTS + 1).min(MOST_BETWEEN);
-    let count = POINTS * between;
-    let mut found: [Vec<[f64; 2]>; 6] = Default::default();
-    for k in 0..=count {
-        let t_s = start_s + span_s * k as f64 / count as f64;
-        let (log, tracked) = (of_log(loaded, t_s), of_tracker(loaded, t_s));
-        for (axis, errors) in found.iter_mut().enumerate() {
-            let error = tracked[axis] - log[axis];
-            errors.push([t_s, if axis < 3 { error } else { shorter_deg(error) }]);
+/// `points` with those of a part in place of their own there.
+fn around(points: &[[f64; 2]], [from_s, to_s]: [f64; 2], part: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let [first, end] = [points.partition_point(|point| point[0] < from_s), points.partition_point(|point| point[0] <= to_s)];
+    [&points[..first], &part, &points[end..]].concat()
+}
+
+/// Tracker less log, of lines that belong together.
+fn differences(channel: &Channel) -> Vec<[f64; 2]> {
+    let [(_, log), (_, tracked)] = channel.lines.as_slice() else { return Vec::new() };
+    log.iter().zip(tracked).map(|(log, tracked)| [log[0], tracked[1] - log[1]]).collect()
+}
+
+/// All plots at these instants, without what there is to say beside them.
+fn channels(loaded: &Loaded, instants: &Instants) -> Vec<Channel> {
+    let sequence = &loaded.sequence;
+    let over = |times: &[f64], value: &dyn Fn(f64) -> f64| times.iter().map(|&t_s| [t_s, value(t_s)]).collect::<Vec<_>>();
+    let (limits, camera, times) = (&loaded.tracked.limits, &sequence.scenario.camera, &instants.all);
+    let state = |t_s: f64| sequence.path.trajectory.state(t_s);
+    let both: Vec<[[f64; 6]; 2]> = times.iter().map(|&t_s| [of_log(loaded, t_s), of_tracker(loaded, t_s)]).collect();
+    let of_axis = |(axis, name): (usize, &'static str)| {
+        let of = |which: usize| times.iter().zip(&both).map(move |(&t_s, both)| [t_s, both[which][axis]]).collect::<Vec<_>>();
+        let [mut log, mut tracked] = [of(0), of(1)];
+        if is_angle(axis) {
+            log = continuous(log);
+            // Beside the log, not a turn away from it.
+            for (tracked, log) in tracked.iter_mut().zip(&log) {
+                tracked[1] = log[1] + shorter_deg(tracked[1] - log[1]);
+            }
         }
+        Channel { name, note: String::new(), lines: vec![("log", log), ("tracker", tracked)], limit: None, error: None }
+    };
+    let mut channels: Vec<Channel> = AXES.into_iter().enumerate().map(of_axis).collect();
+    // Roll and yaw mean nothing near pitch +-90; the angle of the whole error always does.
+    let off = |t_s: f64| so3::log(loaded.log.interpolate(t_s).1.inverse() * state(t_s).ned_from_body).length().to_degrees();
+    let attitude = vec![("tracker less log", over(times, &off))];
+    channels.push(Channel { name: "attitude error, deg", note: String::new(), lines: attitude, limit: None, error: None });
+    let mut plain = |name: &'static str, points: Vec<[f64; 2]>, limit: Option<f64>| {
+        channels.push(Channel { name, note: String::new(), lines: vec![(name, points)], limit, error: None });
+    };
+    let spec = &sequence.scenario.tracker;
+    plain("speed, m/s", over(times, &|t_s| state(t_s).velocity_ned_m_s.length()), Some(limits.max_speed_m_s));
+    plain("acceleration, m/s2", over(times, &|t_s| state(t_s).acceleration_ned_m_s2.length()), Some(spec.max_acceleration_m_s2));
+    let rate_limit = limits.max_angular_rate_rad_s.to_degrees();
+    plain("body rate, deg/s", over(times, &|t_s| state(t_s).rate_body_rad_s.length().to_degrees()), Some(rate_limit));
+    let focal_px = 0.5 * (camera.focal_px[0] + camera.focal_px[1]);
+    let (exposure_s, readout_s) = (1e-3 * camera.shutter.exposure_ms, 1e-3 * camera.shutter.readout_ms);
+    let image_speed = over(&instants.of_ground, &|t_s| image_speed_px_s(loaded, focal_px, t_s));
+    for (name, share_s) in [("blur in the middle, px", exposure_s), ("row skew in the middle, px", readout_s)] {
+        plain(name, image_speed.iter().map(|[t_s, speed]| [*t_s, speed * share_s]).collect(), None);
     }
-    found.map(|errors| Errors::of(&errors, between as usize))
+    channels
 }
 
-/// An angle's error does not count turns.
-fn shorter_deg(error: f64) -> f64 {
-    error - 360.0 * (error / 360.0).round()
+/// Largest speed, acceleration and body rate (deg/s) at the tracker's own ticks in a span and at its ends: between two ticks velocities go straight, so that
+/// none of them is larger there.
+fn largest_motion(loaded: &Loaded, [from_s, to_s]: [f64; 2]) -> [f64; 3] {
+    let trajectory = &loaded.sequence.path.trajectory;
+    let of = |state: &camsim_core::pose::BodyState| {
+        [state.velocity_ned_m_s, state.acceleration_ned_m_s2, state.rate_body_rad_s].map(|value| value.length_squared())
+    };
+    let larger = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|k| f64::max(a[k], b[k]));
+    let ends = [from_s, to_s].map(|t_s| of(&trajectory.state(t_s)));
+    let inner =
+        trajectory.knots().iter().enumerate().filter(|(k, _)| is_within(trajectory.knot_s(*k), [from_s, to_s])).map(|(_, state)| of(state));
+    let [speed, acceleration, rate] = inner.chain(ends).fold([0.0; 3], larger).map(f64::sqrt);
+    [speed, acceleration, rate.to_degrees()]
 }
 
 fn of_log(loaded: &Loaded, t_s: f64) -> [f64; 6] {
@@ -168,6 +242,14 @@ fn continuous(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points
 }
 
+/// Takes the turns away that lines of angles have made by `t_s`: how many there were in hours of few points is not known anyway.
+fn less_turns(lines: &mut [(&'static str, Vec<[f64; 2]>)], t_s: f64) {
+    let Some((_, first)) = lines.first() else { return };
+    let at = first.partition_point(|point| point[0] < t_s).min(first.len().saturating_sub(1));
+    let turns = first.get(at).map_or(0.0, |point| (point[1] / 360.0).round());
+    lines.iter_mut().flat_map(|(_, points)| points).for_each(|point| point[1] -= 360.0 * turns);
+}
+
 /// How fast what the optical axis meets moves over the picture: by turning, and by moving past it at its distance.
 fn image_speed_px_s(loaded: &Loaded, focal_px: f64, t_s: f64) -> f64 {
     let path = &loaded.sequence.path;
@@ -185,72 +267,4 @@ fn image_speed_px_s(loaded: &Loaded, focal_px: f64, t_s: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::tests::harness::demo;
-
-    fn loaded() -> Arc<Loaded> {
-        let scenario = camsim_io::scenario_file::read_scenario(&demo(), &[], None).expect("legal");
-        Arc::new(camsim_io::load::load_sequence(&scenario).expect("loaded"))
-    }
-
-    #[test]
-    fn image_speed_is_that_of_the_point_in_the_middle() {
-        let loaded = loaded();
-        let path = &loaded.sequence.path;
-        let terrain = loaded.sequence.scene.terrain.as_ref().expect("a terrain");
-        for t_s in [25.3, 27.0, 28.5] {
-            let pose = path.pose(t_s);
-            let axis = pose.ned_from_camera * DVec3::Z;
-            let point = pose.position_ned_m + axis * terrain.intersect(pose.position_ned_m, axis, f64::INFINITY).expect("ground").t;
-            // Central difference of the fixed point's ideal coordinates.
-            let uv = |t_s: f64| {
-                let pose = path.pose(t_s);
-                let seen = pose.ned_from_camera.conjugate() * (point - pose.position_ned_m);
-                seen.truncate() / seen.z
-            };
-            let h = 1e-5;
-            let exact = 400.0 * (uv(t_s + h) - uv(t_s - h)).length() / (2.0 * h);
-            let found = image_speed_px_s(&loaded, 400.0, t_s);
-            assert!((found - exact).abs() < 1e-4 * exact, "{found} {exact} px/s at {t_s} s");
-        }
-    }
-
-    #[test]
-    fn errors_keep_their_peaks_however_few_points_there_are() {
-        let mut errors: Vec<[f64; 2]> = (0..1000).map(|k| [f64::from(k), 0.1]).collect();
-        errors[517] = [517.0, -3.0];
-        let found = Errors::of(&errors, 100);
-        assert_eq!((found.points.len(), found.points[5], found.largest), (10, [517.0, -3.0], 3.0));
-        assert!((found.rms - ((999.0 * 0.01 + 9.0) / 1000.0_f64).sqrt()).abs() < 1e-12, "{}", found.rms);
-        assert_eq!([shorter_deg(-358.0), shorter_deg(3.0), shorter_deg(190.0)], [2.0, 3.0, -170.0]);
-    }
-
-    #[test]
-    fn errors_are_those_of_the_tracker_at_its_instants() {
-        let loaded = loaded();
-        let series = Series::new(&loaded);
-        for (axis, channel) in series.channels.iter().take(6).enumerate() {
-            let error = channel.error.as_ref().expect("there is a log");
-            for [t_s, error] in error.iter().step_by(97) {
-                let found = of_tracker(&loaded, *t_s)[axis] - of_log(&loaded, *t_s)[axis];
-                assert!((shorter_deg(found - error)).abs() < 1e-9, "{} at {t_s}: {found} {error}", channel.name);
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_small_has_digits_too() {
-        assert_eq!(
-            [digits(0.0), digits(12.3456), digits(0.1234), digits(0.0191), digits(0.000_312)],
-            ["0.000", "12.346", "0.123", "0.0191", "0.000312"]
-        );
-    }
-
-    #[test]
-    fn angles_have_no_jumps() {
-        let wrapped = [170.0, 179.0, -172.0, -160.0, 175.0].iter().enumerate().map(|(k, v)| [k as f64, *v]).collect();
-        let values: Vec<f64> = continuous(wrapped).iter().map(|point| point[1]).collect();
-        assert_eq!(values, [170.0, 179.0, 188.0, 200.0, 175.0]);
-    }
-}
+mod tests;

@@ -24,6 +24,8 @@ use crate::{
 pub const REST_S: f64 = 0.2;
 /// In play, frames that take longer than this in full size are shown as previews, ms.
 const QUICK_MS: f64 = 60.0;
+/// News are told for so long, seconds.
+const NEWS_S: f64 = 6.0;
 /// Recent files that are remembered.
 const MOST_RECENT: usize = 8;
 
@@ -36,6 +38,15 @@ pub enum Leaving {
     Closing,
 }
 
+/// That something was done as it was wished.
+#[derive(Clone, Debug, PartialEq)]
+pub struct News {
+    /// In words.
+    pub text: String,
+    /// egui's time from which on it is not told any more.
+    pub until_s: f64,
+}
+
 /// The window's state.
 pub struct State {
     /// The scenario, if one is open.
@@ -46,8 +57,10 @@ pub struct State {
     pub view: View,
     /// What the engine said.
     pub heard: Heard,
-    /// Faults and news that nobody has dismissed.
+    /// Faults that nobody has dismissed, and what else must not go unread.
     pub notices: Vec<String>,
+    /// What was done, for a moment.
+    pub news: Option<News>,
     /// Pixel under the cursor.
     pub hovered: Option<[u32; 2]>,
     /// Pixel that is kept in the inspector.
@@ -81,6 +94,7 @@ impl State {
             view: settings.view,
             heard: Heard::default(),
             notices: Vec::new(),
+            news: None,
             hovered: None,
             pinned: None,
             help: false,
@@ -110,6 +124,7 @@ impl State {
     pub fn tick(&mut self, now_s: f64) {
         let seconds = now_s - self.now_s;
         self.now_s = now_s;
+        self.news.take_if(|news| news.until_s <= now_s);
         self.timeline.advance(seconds);
     }
 
@@ -284,18 +299,20 @@ impl State {
             }),
             Message::CopyCommand => {
                 context.copy_text(document.command_line());
-                Ok(Some(match document.left_out().as_slice() {
-                    [] => "the command line is on the clipboard".into(),
+                match document.left_out().as_slice() {
+                    [] => Ok(Some("the command line is on the clipboard".into())),
                     keys => {
-                        format!("the command line is on the clipboard; it cannot leave out {}: save the scenario for that", keys.join(", "))
+                        let keys = keys.join(", ");
+                        Err(format!("the command line is on the clipboard; it cannot leave out {keys}: save the scenario for that"))
                     }
-                }))
+                }
             }
             _ => return false,
         };
         match told {
             Ok(None) => {}
-            Ok(Some(text)) | Err(text) => self.notice(text),
+            Ok(Some(text)) => self.news = Some(News { text, until_s: self.now_s + NEWS_S }),
+            Err(text) => self.notice(text),
         }
         true
     }

@@ -96,7 +96,7 @@ pub struct View {
     pub gain: f32,
     /// Place of the wipe's line, 0 to 1 over the picture's width.
     pub wipe: f32,
-    /// Points of the screen for each pixel of the camera; `None` fits the picture into the pane.
+    /// Pixels of the screen (not points, of which one may have several) for each pixel of the camera; `None` fits the picture into the pane.
     pub zoom: Option<f32>,
     /// Pixel of the camera in the middle of the pane, as a share of its size; of no meaning for a fitted picture.
     pub centre: [f32; 2],

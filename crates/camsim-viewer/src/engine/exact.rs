@@ -76,7 +76,9 @@ fn draw(oracle: &Oracle, wanted: &ExactWanted, drawn: &mut Drawn, mailbox: &Mail
     let tell = |drawn: &Drawn| {
         let difference = wanted.against.as_ref().and_then(|(picture, gain)| {
             let against = &picture.frame;
-            (against.size_px == size_px).then(|| difference(size_px, &against.color_rgba, &drawn.color_rgba, *gain)).flatten()
+            (against.size_px == size_px)
+                .then(|| difference(size_px, &against.color_rgba, &drawn.color_rgba, *gain, drawn.rows as u32))
+                .flatten()
         });
         speaker.say(Reply::Exact(Box::new(ExactPicture {
             sequence: wanted.sequence.clone(),

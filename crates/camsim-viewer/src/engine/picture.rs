@@ -48,8 +48,9 @@ pub fn screen(size_px: [u32; 2], color_rgba: &[f32]) -> ColorImage {
     ColorImage::from_rgba_unmultiplied(size_px.map(|side| side as usize), &rgba)
 }
 
-/// `a - b` times `gain` about a middle grey, in linear values; `None` for pictures of different size.
-pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32) -> Option<Difference> {
+/// `a - b` times `gain` about a middle grey, in linear values, of the first `rows`: one of them may not have come further. `None` for pictures of different
+/// size.
+pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32, rows: u32) -> Option<Difference> {
     if a.len() != b.len() || a.len() != 4 * size_px[0] as usize * size_px[1] as usize {
         return None;
     }
@@ -69,10 +70,13 @@ pub fn difference(size_px: [u32; 2], a: &[f32], b: &[f32], gain: f32) -> Option<
             Color32::from_rgb(255, 0, 255)
         }
     });
-    let pixels: Vec<Color32> = pixels.collect();
+    let all = a.len() / 4;
+    let compared = all.min(size_px[0] as usize * rows as usize);
+    let mut pixels: Vec<Color32> = pixels.take(compared).collect();
+    pixels.resize(all, Color32::TRANSPARENT);
     let image = Arc::new(ColorImage::new(size_px.map(|side| side as usize), pixels));
     let rms_dn = 255.0 * (squares / (3 * both.max(1)) as f64).sqrt();
-    let one_sided = one as f64 / (image.pixels.len().max(1)) as f64;
+    let one_sided = one as f64 / compared.max(1) as f64;
     Some(Difference { image, rms_dn, max_dn: 255.0 * max, one_sided })
 }
 
@@ -119,13 +123,24 @@ mod tests {
     fn a_difference_has_the_size_of_its_values() {
         let a = [0.5, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 1.0, 0.0, 0.0, 0.0, 0.0];
         let b = [0.4, 0.5, 0.5, 1.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let found = difference([3, 1], &a, &b, 4.0).expect("of one size");
+        let found = difference([3, 1], &a, &b, 4.0, 1).expect("of one size");
         assert!((found.rms_dn - 255.0 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-4, "{}", found.rms_dn);
         assert!((found.max_dn - 25.5).abs() < 1e-4);
         assert!((found.one_sided - 1.0 / 3.0).abs() < 1e-9);
         assert_eq!(found.image.pixels[0].to_array(), [230, 128, 128, 255]);
         assert_eq!(found.image.pixels[2], Color32::TRANSPARENT);
-        assert!(difference([2, 1], &a, &b, 4.0).is_none());
+        assert!(difference([2, 1], &a, &b, 4.0, 1).is_none());
+    }
+
+    #[test]
+    fn rows_that_have_not_come_are_not_compared() {
+        let a = [0.5, 0.5, 0.5, 1.0, 0.2, 0.2, 0.2, 1.0, 0.7, 0.7, 0.7, 1.0];
+        let b = [0.4, 0.5, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let found = difference([1, 3], &a, &b, 4.0, 1).expect("of one size");
+        assert!((found.max_dn - 25.5).abs() < 1e-4 && found.one_sided == 0.0, "{} {}", found.max_dn, found.one_sided);
+        assert_eq!(found.image.pixels[1..], [Color32::TRANSPARENT; 2]);
+        let all = difference([1, 3], &a, &b, 4.0, 3).expect("of one size");
+        assert!((all.one_sided - 2.0 / 3.0).abs() < 1e-9 && all.image.pixels[2] != Color32::TRANSPARENT);
     }
 
     #[test]

@@ -12,12 +12,11 @@ use camsim_gpu::{
     AdapterChoice, Engine, GpuError, RenderError,
     engine::{Finished, Session},
 };
-use camsim_io::load::LoadError;
 
 use super::{
     Speaker,
     errors::Errors,
-    library::Library,
+    library::{Library, LibraryError},
     mailbox::Mailbox,
     messages::{ErrorsReply, FrameReply, Reply, Size, Stage, Truth, Wanted},
     picture::{Picture, depth_image, depth_range_m, difference, screen},
@@ -31,7 +30,7 @@ const KEPT: usize = 8;
 #[derive(Debug, thiserror::Error)]
 enum Fault {
     #[error(transparent)]
-    Load(#[from] LoadError),
+    Load(#[from] LibraryError),
     #[error(transparent)]
     Mount(#[from] camsim_core::mount::MountError),
     #[error(transparent)]
@@ -120,7 +119,10 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn serve(&mut self, wanted: &Wanted, mailbox: &Mailbox<Wanted>) -> Result<(), Fault> {
         let (begun, before) = (Instant::now(), self.rendered);
-        let loaded = self.library.load(wanted, self.speaker)?;
+        let loaded = match self.library.load(wanted, self.speaker) {
+            Err(LibraryError::Superseded) => return Ok(()),
+            loaded => loaded?,
+        };
         let sequence = &loaded.sequence;
         let frame = wanted.frame.min(sequence.frames.saturating_sub(1));
         let mut pictures = Vec::new();
@@ -140,7 +142,10 @@ impl<'a> Worker<'a> {
         let errors = if wanted.errors { self.known_errors(&pictures) } else { Vec::new() };
         let missing = wanted.errors && errors.is_empty();
         let difference = match (wanted.gain, pictures.as_slice()) {
-            (Some(gain), [a, b]) => difference(a.frame.size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain).map(Arc::new),
+            (Some(gain), [a, b]) => {
+                let size_px = a.frame.size_px;
+                difference(size_px, &a.frame.color_rgba, &b.frame.color_rgba, gain, size_px[1]).map(Arc::new)
+            }
             _ => None,
         };
         let took = (self.rendered > before).then(|| begun.elapsed());

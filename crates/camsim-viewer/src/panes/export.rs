@@ -47,7 +47,8 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
     match progress.ended {
         None => {
             let share = progress.done as f32 / all as f32;
-            ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames", progress.done)));
+            let left = job.left_s().map_or_else(String::new, |left_s| format!(", about {} left", span(left_s)));
+            ui.add(egui::ProgressBar::new(share).text(format!("{} of {all} frames{left}", progress.done)));
             let text = if job.is_cancelled() { "stopping" } else { "Cancel" };
             if ui.add_enabled(!job.is_cancelled(), egui::Button::new(text)).clicked() {
                 out.push(Message::CancelExport);
@@ -56,8 +57,30 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
         Some(Ok(text)) => {
             ui.label(text);
         }
+        Some(Err(text)) if job.is_cancelled() => {
+            ui.label(text);
+        }
         Some(Err(text)) => {
             ui.label(egui::RichText::new(text).color(ui.visuals().error_fg_color));
         }
+    }
+}
+
+/// A time that nobody needs to the second.
+fn span(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::span;
+
+    #[test]
+    fn times_are_told_as_people_do() {
+        assert_eq!([0.2, 89.0, 91.0, 3600.0, 9000.0].map(span), ["0 s", "89 s", "2 min", "60 min", "2.5 h"]);
     }
 }

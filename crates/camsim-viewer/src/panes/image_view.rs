@@ -7,6 +7,7 @@ mod toolbar;
 use eframe::egui::{self, Align2, Color32, CursorIcon, FontId, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2};
 
 use self::canvas::Placement;
+use super::widgets::waiting;
 use crate::{
     engine::{Size, Stage},
     heard::Sight,
@@ -25,16 +26,17 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     if pane.width() < 8.0 || pane.height() < 8.0 {
         return;
     }
-    let Some(size_px) = state.document.as_ref().map(|document| document.scenario.camera.size_px) else {
+    if state.document.is_none() {
         ui.put(pane, egui::Label::new("open a scenario, or drop one here"));
         return;
-    };
-    if state.heard.shown.is_none() {
+    }
+    // Of the camera that took what is shown: another one may never have a picture.
+    let Some(size_px) = state.heard.shown.as_ref().map(|shown| shown.reply.wanted.scenario.camera.size_px) else {
         if state.heard.fault.is_none() {
-            ui.put(pane, egui::Spinner::new());
+            ui.put(pane, waiting);
         }
         return;
-    }
+    };
     let panes = match state.view.compare {
         Compare::SideBySide => {
             let (left, right) = pane.split_left_right_at_fraction(0.5);
@@ -42,8 +44,8 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         }
         _ => vec![pane],
     };
-    let placements: Vec<Placement> =
-        panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, 1.0 / ui.pixels_per_point())).collect();
+    let placements: Vec<Placement> = panes.iter().map(|pane| Placement::new(*pane, size_px, &state.view, ui.pixels_per_point())).collect();
+    toolbar::remember(ui, placements.first());
     draw(ui, state, &placements);
     for placement in &placements {
         pinned(ui, state, placement);
@@ -102,13 +104,19 @@ fn side(ui: &Ui, state: &State, placement: &Placement, stage: Stage, clip: Rect,
 
 fn progress(state: &State, sight: &Sight<'_>) -> String {
     if sight.stage == Stage::Oracle {
-        let done = state.heard.current_exact().map_or(0, |exact| exact.picture.rows);
-        return if done < sight.size_px[1] { format!(", {} of {} rows", done, sight.size_px[1]) } else { String::new() };
+        return rows_done(state);
     }
     let is_preview = state.heard.shown.as_ref().is_some_and(|shown| shown.reply.wanted.size == Size::Preview);
     let size = if is_preview { format!(", preview {}x{}", sight.size_px[0], sight.size_px[1]) } else { String::new() };
     let missing = state.view.overlays.error && sight.errors.is_none();
     if missing { format!("{size}; predicted error once the hand rests") } else { size }
+}
+
+/// How far the oracle is, as long as it is not through.
+fn rows_done(state: &State) -> String {
+    let Some(exact) = state.heard.current_exact() else { return String::new() };
+    let (done, all) = (exact.picture.rows, exact.picture.sequence.scenario.camera.size_px[1]);
+    if done < all { format!(", {done} of {all} rows") } else { String::new() }
 }
 
 fn difference(ui: &Ui, state: &State, placement: &Placement) {
@@ -128,10 +136,11 @@ fn difference(ui: &Ui, state: &State, placement: &Placement) {
         if difference.one_sided > 0.0 { format!(", {:.2} % valid in one alone", 100.0 * difference.one_sided) } else { String::new() };
     // The oracle is always what is taken away.
     let pair = if view.a == Stage::Oracle { format!("{} - oracle", view.b.label()) } else { pair };
+    let so_far = if view.wants_oracle() { rows_done(state) } else { String::new() };
     label(
         &painter,
         corner,
-        &format!("{pair}, x{:.0}: RMS {:.3}, largest {:.2} of 255{one_sided}", view.gain, difference.rms_dn, difference.max_dn),
+        &format!("{pair}, x{:.0}: RMS {:.3}, largest {:.2} of 255{one_sided}{so_far}", view.gain, difference.rms_dn, difference.max_dn),
     );
 }
 

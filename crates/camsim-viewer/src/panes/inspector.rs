@@ -46,12 +46,16 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 
 /// Values of a picture.
 fn value(ui: &mut Ui, state: &State, sight: &Sight<'_>, [x, y]: [u32; 2]) {
-    let full = state.heard.sequence().map_or(sight.size_px, |sequence| sequence.scenario.camera.size_px);
+    let full = state.heard.shown.as_ref().map_or(sight.size_px, |shown| shown.reply.wanted.scenario.camera.size_px);
     let factor = if full == sight.size_px { 1 } else { crate::engine::preview_factor(full) };
     let at = 4 * ((y / factor) as usize * sight.size_px[0] as usize + (x / factor) as usize);
     let Some(&[r, g, b, a]) = sight.color_rgba.get(at..at + 4).and_then(|pixel| pixel.first_chunk::<4>()) else { return };
     ui.separator();
     ui.strong(sight.stage.label());
+    if sight.stage == crate::engine::Stage::Oracle && state.heard.current_exact().is_some_and(|exact| y >= exact.picture.rows) {
+        ui.label("on its way: its rows come from the top");
+        return;
+    }
     facts(ui, sight.stage.label(), |ui| {
         fact(ui, "linear", format!("{r:.5} {g:.5} {b:.5}"), "scene-linear R G B, as in the EXR");
         fact(ui, "sRGB", format!("{} {} {}", srgb8(r), srgb8(g), srgb8(b)), "8-bit codes, as in the PNG");

@@ -13,6 +13,7 @@ use self::chart::Chart;
 use super::widgets::fixed;
 use crate::{
     message::{Message, Outbox},
+    motion,
     state::State,
 };
 
@@ -40,7 +41,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
     background(&painter, &chart, ui.visuals().text_color(), &screen);
     let pose = sequence.path.pose(stamp_s);
-    if let Ok(camera) = CameraModel::from_spec(&sequence.scenario.camera) {
+    if let Some(camera) = motion::camera_of(&sequence.scenario.camera) {
         let footprint = footprint(ui, sequence, state.timeline.frame, &camera, &pose);
         seen(&painter, &camera, &footprint, &pose, LOOK * size.x, &screen);
     }

@@ -68,9 +68,32 @@ fn status(ui: &mut Ui, state: &State) {
         let mark = if document.is_unsaved() { " (changed)" } else { "" };
         ui.label(format!("{name}{mark}")).on_hover_text(document.path.display().to_string());
     }
+    warnings(ui, state);
     let time = |what: &str, ms: Option<f64>| ms.map(|ms| format!("{what} {ms:.0} ms"));
     let times: Vec<String> = [time("frame", state.heard.full_ms), time("preview", state.heard.preview_ms)].into_iter().flatten().collect();
     ui.weak(times.join(", ")).on_hover_text(format!("rendered on {}", state.heard.adapter));
+    if let Some(news) = &state.news {
+        ui.separator();
+        ui.label(&news.text);
+        let left_s = news.until_s - ui.input(|input| input.time);
+        ui.ctx().request_repaint_after_secs(left_s.max(0.0) as f32 + 0.01);
+    }
+}
+
+/// What `camsim render` would say of the scenario before it renders: how many, and which for whoever asks.
+fn warnings(ui: &mut Ui, state: &State) {
+    let warnings = state.heard.loaded.as_ref().map_or(&[][..], |loaded| &loaded.warnings);
+    if warnings.is_empty() {
+        return;
+    }
+    let text = if let [_] = warnings { "1 warning".to_owned() } else { format!("{} warnings", warnings.len()) };
+    let color = ui.visuals().warn_fg_color;
+    ui.menu_button(egui::RichText::new(text).color(color), |ui| {
+        ui.set_max_width(420.0);
+        for warning in warnings {
+            ui.add(egui::Label::new(egui::RichText::new(warning).color(color)).wrap());
+        }
+    });
 }
 
 /// Asks for what to open; begins in the folder of what is open.

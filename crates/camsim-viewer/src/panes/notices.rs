@@ -2,7 +2,7 @@
 
 use eframe::egui;
 
-use super::widgets::named;
+use super::widgets::{named, waiting};
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -29,7 +29,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     }
     if !state.heard.busy.is_empty() {
         ui.horizontal(|ui| {
-            ui.spinner();
+            waiting(ui);
             let seconds = state.heard.busy_since.map_or(0, |since| since.elapsed().as_secs());
             let so_far = if seconds > 0 { format!(" ({seconds} s)") } else { String::new() };
             ui.label(format!("{}{so_far}", state.heard.busy));

@@ -1,11 +1,34 @@
 //! Small things that several panes draw.
 
-use eframe::egui::{self, Response, Role, Ui, WidgetInfo};
+use std::{f32::consts::TAU, time::Duration};
+
+use eframe::egui::{self, Response, Role, Sense, Shape, Stroke, Ui, WidgetInfo, vec2};
+
+/// Time between two looks at [`waiting`].
+const BEAT: Duration = Duration::from_millis(250);
+/// Steps of it in a turn.
+const BEATS: u64 = 8;
 
 /// One choice of several. `name` is what assistive technology and tests call it, where the text alone would not tell.
 pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, explanation: &str) -> Response {
     let response = ui.selectable_label(selected, text).on_hover_text(explanation);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, ui.is_enabled(), selected, name));
+    response
+}
+
+/// Says that something takes a while. egui's own spinner has the window drawn as often as it can be, which on a software adapter takes the very
+/// processors that are waited for: this one moves four times a second.
+pub fn waiting(ui: &mut Ui) -> Response {
+    let side = ui.spacing().interact_size.y;
+    let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::ProgressIndicator, ui.is_enabled(), "working"));
+    let beat = (ui.input(|input| input.time) / BEAT.as_secs_f64()) as u64 % BEATS;
+    let point = |step: u16| {
+        let angle = TAU * (beat as f32 / BEATS as f32 + 0.7 * f32::from(step) / 20.0);
+        rect.center() + 0.35 * side * vec2(angle.cos(), angle.sin())
+    };
+    ui.painter().add(Shape::line((0..=20).map(point).collect(), Stroke::new(0.1 * side, ui.visuals().strong_text_color())));
+    ui.ctx().request_repaint_after(BEAT);
     response
 }
 

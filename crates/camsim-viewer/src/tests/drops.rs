@@ -57,7 +57,8 @@ fn each_kind_of_file_becomes_what_it_is() {
         let mut state = state(Some(demo()));
         drop::take(&mut state, &path);
         let document = state.document.as_ref().expect("open");
-        assert!(state.notices.is_empty(), "{}: {:?}", path.display(), state.notices);
+        // Of the calibration, that its pose is not taken.
+        assert!(state.notices.iter().all(|notice| word == "481" && notice.contains("T_BS")), "{}: {:?}", path.display(), state.notices);
         let text = toml::to_string(&*document.scenario).expect("text");
         assert!(text.contains(word), "{}: {text}", path.display());
         assert!(state.is_unsaved(), "and it can be undone: {}", path.display());
@@ -159,4 +160,23 @@ fn of_files_dropped_together_the_scenario_comes_first_and_pictures_wait_for_each
         let text = toml::to_string(&*state.document.as_ref().expect("open").scenario).expect("text");
         assert!(text.contains("2.png") || !state.notices.is_empty(), "{key}: {:?}", state.notices);
     }
+}
+
+#[test]
+fn a_calibration_keeps_what_it_does_not_tell() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (calibration, _) = parts(folder.path()).into_iter().find(|(path, _)| path.ends_with("sensor.yaml")).expect("one of them");
+    let mut state = state(Some(demo()));
+    let before = state.document.as_ref().expect("open").scenario.camera.clone();
+    assert!(before.shutter.readout_ms > 0.0 && before.photometric.noise_sigma > 0.0 && before.photometric.vignette.is_some());
+    drop::take(&mut state, &calibration);
+    let after = state.document.as_ref().expect("open").scenario.camera.clone();
+    assert_eq!((after.size_px, after.focal_px), ([752, 481], [458.654, 457.296]));
+    assert_eq!((&after.shutter, after.fps, &after.mount), (&before.shutter, before.fps, &before.mount));
+    assert_eq!(after.photometric.noise_sigma, before.photometric.noise_sigma);
+    assert_eq!(after.photometric.vignette, None, "that was the other lens's");
+    // A camera file of camsim's own tells all of it.
+    let (own, _) = parts(folder.path()).into_iter().find(|(path, _)| path.ends_with("lens.toml")).expect("one of them");
+    drop::take(&mut state, &own);
+    assert_eq!(state.document.as_ref().expect("open").scenario.camera.shutter, camsim_core::scenario::ShutterSpec::default());
 }

@@ -63,6 +63,13 @@ fn saved_and_opened_again_it_is_the_same() {
     window.step();
     window.click("Save here");
     assert!(saved.is_file(), "{:?}", window.state().notices);
+    // That is told for a moment, and nobody need dismiss it.
+    let told = format!("saved {}", saved.display());
+    assert!(has(&window, &told) && window.state().notices.is_empty());
+    for _ in 0..400 {
+        window.step();
+    }
+    assert!(!has(&window, &told));
     let scenario = window.state().document.as_ref().expect("open").scenario.clone();
     send(&mut window, Message::Open(saved.clone()));
     assert_eq!(window.state().document.as_ref().expect("open").scenario, scenario);
@@ -141,4 +148,23 @@ fn text_goes_to_the_clipboard() {
         let text = found.unwrap_or_default();
         assert!(text.contains(told), "{button}: {text}");
     }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn what_render_would_warn_of_is_on_show() {
+    let mut window = Window::open(Some(demo()));
+    window.settle();
+    let shown = |window: &Window| window.harness.query_all_by_label_contains("warning").count();
+    assert_eq!((shown(&window), &window.state().heard.loaded.as_ref().expect("loaded").warnings), (0, &Vec::new()));
+    send(&mut window, Message::Set("tracker.max_acceleration_m_s2".into(), Some(Value::Float(0.2)), false));
+    window.settle();
+    let warnings = window.state().heard.loaded.as_ref().expect("loaded").warnings.clone();
+    let told = warnings.iter().find(|warning| warning.contains("tracker.max_acceleration_m_s2")).expect("held back");
+    assert!(!has(&window, told));
+    window.click(&if warnings.len() == 1 { "1 warning".to_owned() } else { format!("{} warnings", warnings.len()) });
+    assert!(has(&window, told));
+    send(&mut window, Message::Undo);
+    window.settle();
+    assert_eq!(shown(&window), 0);
 }

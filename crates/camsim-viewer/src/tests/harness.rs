@@ -35,6 +35,24 @@ pub fn pattern() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml")
 }
 
+/// Ten hours in circles over that scene, a row a second with a gap of a minute; in a folder of its own.
+pub fn long_flight(folder: &Path) -> PathBuf {
+    camsim_io::builtin::unpack(folder).expect("unpacked");
+    let mut log = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
+    for second in (0..36_000).filter(|second| !(5_000..5_060).contains(second)) {
+        let angle = f64::from(second) * 0.01;
+        let [north_m, east_m] = [900.0 * angle.cos(), 900.0 * angle.sin()];
+        log += &format!("{second},{north_m:.3},{east_m:.3},-500,0,0,{:.3}\n", (angle.to_degrees() + 90.0) % 360.0);
+    }
+    std::fs::write(folder.join("long.csv"), log).expect("written");
+    let pattern = std::fs::read_to_string(folder.join("pattern.toml")).expect("text");
+    let mut table: toml::Table = pattern.parse().expect("toml");
+    table["flight"] = toml::Value::Table("log = \"long.csv\"\nformat = \"csv-ned\"".parse().expect("toml"));
+    let path = folder.join("long.toml");
+    std::fs::write(&path, table.to_string()).expect("written");
+    path
+}
+
 /// A viewer and its window.
 pub struct Window {
     pub harness: Harness<'static, Option<Viewer>>,

@@ -2,7 +2,7 @@
 
 use toml::Value;
 
-use super::harness::{Window, has, pattern, send};
+use super::harness::{Window, has, long_flight, pattern, send};
 use crate::{message::Message, state::Leaving};
 
 fn changed() -> Window {
@@ -56,4 +56,17 @@ fn closing_asks_once() {
     window.click("Cancel");
     send(&mut window, Message::Undo);
     assert!(!close(&mut window), "without changes nothing is asked");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn hours_of_flight_need_not_be_waited_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut window = Window::open(Some(long_flight(folder.path())));
+    window.wait("reading", |state| state.heard.busy.contains("long.csv"));
+    send(&mut window, Message::Open(pattern()));
+    window.settle();
+    assert!(window.state().timeline.frames < 1_000_000 && window.state().heard.fault.is_none() && window.state().notices.is_empty());
+    assert_eq!(window.state().document.as_ref().expect("open").path, pattern());
+    window.wait("no word of it", |state| state.heard.busy.is_empty());
 }

@@ -7,7 +7,7 @@ use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::DVec2;
 
-use super::harness::{Window, demo, has, pattern, send};
+use super::harness::{Window, demo, has, long_flight, pattern, send};
 use crate::{message::Message, motion, view::Tab};
 
 #[test]
@@ -175,26 +175,7 @@ fn nothing_open_and_a_log_of_ten_hours() {
     window.step();
     assert!(has(&window, "nothing open"));
     let folder = tempfile::tempdir().expect("a folder");
-    camsim_io::builtin::unpack(folder.path()).expect("unpacked");
-    let mut log = String::from("t_s,north_m,east_m,down_m,roll_deg,pitch_deg,yaw_deg\n");
-    for second in 0..36_000 {
-        let angle = f64::from(second) * 0.01;
-        // With a gap of a minute.
-        if !(5_000..5_060).contains(&second) {
-            log += &format!(
-                "{second},{:.3},{:.3},-500,0,0,{:.3}\n",
-                900.0 * angle.cos(),
-                900.0 * angle.sin(),
-                (angle.to_degrees() + 90.0) % 360.0
-            );
-        }
-    }
-    std::fs::write(folder.path().join("long.csv"), log).expect("written");
-    let pattern = std::fs::read_to_string(folder.path().join("pattern.toml")).expect("text");
-    let mut table: toml::Table = pattern.parse().expect("toml");
-    table["flight"] = toml::Value::Table("log = \"long.csv\"\nformat = \"csv-ned\"".parse().expect("toml"));
-    let path = folder.path().join("long.toml");
-    std::fs::write(&path, table.to_string()).expect("written");
+    let path = long_flight(folder.path());
     send(&mut window, Message::Open(path));
     window.settle();
     assert!(window.state().timeline.frames > 1_000_000, "{:?}", window.state().timeline);
@@ -209,4 +190,18 @@ fn nothing_open_and_a_log_of_ten_hours() {
     }
     assert_eq!(window.state().heard.gaps_s, [[4999.0, 5060.0]]);
     assert_eq!(window.state().heard.shown.as_ref().expect("shown").reply.frame, 900_000);
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn files_that_are_held_over_the_window_are_named() {
+    let mut window = Window::open(Some(pattern()));
+    window.settle();
+    let held = egui::HoveredFile { path: Some(pattern()), mime: String::new() };
+    window.harness.input_mut().hovered_files.push(held);
+    (0..3).for_each(|_| window.step());
+    assert!(has(&window, "drop to open or use pattern.toml"));
+    window.harness.input_mut().hovered_files.clear();
+    window.step();
+    assert!(!has(&window, "drop to open or use pattern.toml"));
 }

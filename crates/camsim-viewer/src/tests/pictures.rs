@@ -2,14 +2,16 @@
 
 use std::{convert::Infallible, sync::Arc};
 
+use camsim_core::scenario::{CameraSpec, LensModel, LensSpec};
 use camsim_gpu::{AdapterChoice, Engine};
 use camsim_io::{load::load_sequence, scenario_file::read_scenario, write::write_picture};
 use eframe::egui;
 use egui_kittest::kittest::Queryable;
 
-use super::harness::{Window, demo, pattern};
+use super::harness::{Window, demo, has, pattern, send};
 use crate::{
     engine::Stage,
+    message::Message,
     state::State,
     view::{Compare, Overlays, View},
 };
@@ -43,23 +45,25 @@ fn the_picture_on_show_is_what_render_writes() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
-fn at_one_point_a_pixel_the_screen_has_the_pictures_own_codes() {
-    for by_own_pipeline in [true, false] {
+fn at_one_to_one_the_screen_has_the_pictures_own_codes() {
+    for (by_own_pipeline, pixels_per_point) in [(true, 1.0), (false, 1.0), (true, 2.0), (false, 2.0)] {
         let mut window = Window::drawn(Some(pattern()), None, [1600.0, 1000.0], by_own_pipeline);
-        codes_on_the_screen(&mut window);
+        window.harness.set_pixels_per_point(pixels_per_point);
+        codes_on_the_screen(&mut window, pixels_per_point);
     }
 }
 
-fn codes_on_the_screen(window: &mut Window) {
+fn codes_on_the_screen(window: &mut Window, pixels_per_point: f32) {
     window.settle();
     window.click("1:1");
-    // The middle of the picture on the middle of the pane may lie between two points of the screen.
+    assert!(has(window, "100 %"));
+    // The middle of the picture on the middle of the pane may lie between two pixels of the screen.
     let rect = window.harness.get_by_label("picture").rect();
     let image = window.state().heard.picture().expect("a picture").image.clone();
     let [width, height] = image.size;
     let screen = window.picture();
-    let origin = rect.center() - egui::vec2(width as f32, height as f32) * 0.5;
-    assert!(rect.width() >= 64.0 && rect.height() >= 64.0);
+    let origin = rect.center() * pixels_per_point - egui::vec2(width as f32, height as f32) * 0.5;
+    assert!(rect.width() * pixels_per_point >= 64.0 && rect.height() * pixels_per_point >= 64.0);
     let (mut same, mut all) = (0, 0);
     for y in 0..40 {
         for x in 0..40 {
@@ -207,4 +211,28 @@ fn small(folder: &std::path::Path) -> std::path::PathBuf {
     let path = folder.join("small.toml");
     std::fs::write(&path, toml::to_string(&scenario).expect("text")).expect("written");
     path
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_camera_without_a_picture_leaves_the_last_one_as_it_was() {
+    let mut window = Window::open(Some(pattern()));
+    window.settle();
+    let shown_px = window.state().document.as_ref().expect("open").scenario.camera.size_px;
+    let middle = window.harness.get_by_label("picture").rect().center();
+    // Sees all around, which no flat ideal frame can.
+    let lens = LensSpec { model: LensModel::KannalaBrandt, coefficients: vec![0.0] };
+    let camera = CameraSpec { size_px: [512, 512], focal_px: [150.0, 150.0], lens, ..CameraSpec::default() };
+    send(&mut window, Message::Camera(Box::new(camera)));
+    window.wait("the fault", |state| state.heard.fault.as_ref().is_some_and(|fault| fault.contains("too wide")));
+    // The fault's text has moved the pane.
+    let pane = window.harness.get_by_label("picture").rect();
+    assert!(pane.contains(middle));
+    window.harness.event(egui::Event::PointerMoved(pane.center()));
+    (0..2).for_each(|_| window.step());
+    let [x, y] = window.state().hovered.expect("on the picture");
+    assert!(x.abs_diff(shown_px[0] / 2) <= 1 && y.abs_diff(shown_px[1] / 2) <= 1, "{x} {y} of {shown_px:?}");
+    send(&mut window, Message::Undo);
+    window.wait("a picture without fault", |state| state.heard.fault.is_none());
+    window.settle();
 }

@@ -1,6 +1,6 @@
 //! Where pixels lie on the screen, and the hand that moves them.
 
-use eframe::egui::{self, Painter, Pos2, Rect, Response, Ui, Vec2, pos2, vec2};
+use eframe::egui::{Painter, Pos2, Rect, Response, Ui, Vec2, pos2, vec2};
 
 use crate::{
     engine::preview_factor,
@@ -10,7 +10,7 @@ use crate::{
     view::View,
 };
 
-/// Points of the screen a pixel, at least and at most.
+/// Pixels of the screen a pixel, at least and at most.
 const ZOOM: [f32; 2] = [0.02, 64.0];
 
 /// A camera's picture in a pane.
@@ -22,23 +22,30 @@ pub struct Placement {
     pub size_px: [u32; 2],
     /// Points a pixel.
     pub scale: f32,
+    /// Of the screen.
+    pixels_per_point: f32,
     origin: Pos2,
 }
 
 impl Placement {
-    /// As the view says; `points_per_pixel` of the screen.
-    pub fn new(pane: Rect, size_px: [u32; 2], view: &View, points_per_pixel: f32) -> Self {
+    /// As the view says; `pixels_per_point` of the screen.
+    pub fn new(pane: Rect, size_px: [u32; 2], view: &View, pixels_per_point: f32) -> Self {
         let size = vec2(size_px[0].max(1) as f32, size_px[1].max(1) as f32);
         let fit = (pane.width() / size.x).min(pane.height() / size.y).max(1e-4);
         let (scale, centre) = match view.zoom {
-            Some(scale) => (scale.clamp(ZOOM[0], ZOOM[1]), view.centre),
+            Some(zoom) => (zoom.clamp(ZOOM[0], ZOOM[1]) / pixels_per_point, view.centre),
             None => (fit, [0.5, 0.5]),
         };
         let origin = pane.center() - vec2(centre[0] * size.x, centre[1] * size.y) * scale;
         // On a border of the screen's own pixels: at one of them a pixel, each then shows just one.
-        let snap = |at: f32| (at / points_per_pixel).round() * points_per_pixel;
+        let snap = |at: f32| (at * pixels_per_point).round() / pixels_per_point;
         let origin = pos2(snap(origin.x), snap(origin.y));
-        Self { pane, size_px, scale, origin }
+        Self { pane, size_px, scale, pixels_per_point, origin }
+    }
+
+    /// Pixels of the screen for each pixel of the camera.
+    pub fn zoom(&self) -> f32 {
+        self.scale * self.pixels_per_point
     }
 
     /// Where the whole picture lies.
@@ -94,7 +101,7 @@ pub fn interact(ui: &Ui, response: &Response, placements: &[Placement], state: &
     let Some((at, placement)) = under.or_else(|| placements.first().map(|first| (first.pane.center(), first))) else { return };
     if response.dragged() && !elsewhere && response.drag_delta() != Vec2::ZERO {
         let centre = placement.share(placement.pane.center() - response.drag_delta());
-        (view.zoom, view.centre) = (Some(placement.scale), centre.map(|share| share.clamp(-0.5, 1.5)));
+        (view.zoom, view.centre) = (Some(placement.zoom()), centre.map(|share| share.clamp(-0.5, 1.5)));
     }
     let factor = ui.input(|input| input.zoom_delta() * (input.smooth_scroll_delta().y / 200.0).exp());
     if response.contains_pointer() && (factor - 1.0).abs() > 1e-4 {
@@ -107,23 +114,18 @@ pub fn interact(ui: &Ui, response: &Response, placements: &[Placement], state: &
 
 /// Enlarged by `factor`, with what is at `at` staying there.
 pub fn zoomed(view: &View, placement: &Placement, at: Pos2, factor: f32) -> View {
-    let scale = (placement.scale * factor).clamp(ZOOM[0], ZOOM[1]);
+    let zoom = (placement.zoom() * factor).clamp(ZOOM[0], ZOOM[1]);
     let fixed = placement.share(at);
-    let from_middle = (at - placement.pane.center()) / scale;
+    let from_middle = (at - placement.pane.center()) * (placement.pixels_per_point / zoom);
     let size = [placement.size_px[0].max(1) as f32, placement.size_px[1].max(1) as f32];
     let centre = [fixed[0] - from_middle.x / size[0], fixed[1] - from_middle.y / size[1]];
-    View { zoom: Some(scale), centre, ..view.clone() }
+    View { zoom: Some(zoom), centre, ..view.clone() }
 }
 
-/// Enlarged by `factor` about the middle of a pane that need not be known: `current` is the scale now.
+/// Enlarged by `factor` about the middle of a pane that need not be known: `current` is the zoom now.
 pub fn zoomed_in_place(view: &View, current: f32, factor: f32) -> View {
     let centre = if view.zoom.is_some() { view.centre } else { [0.5, 0.5] };
     View { zoom: Some((current * factor).clamp(ZOOM[0], ZOOM[1])), centre, ..view.clone() }
-}
-
-/// Scale that fits.
-pub fn fitting(pane: egui::Vec2, size_px: [u32; 2]) -> f32 {
-    (pane.x / size_px[0].max(1) as f32).min(pane.y / size_px[1].max(1) as f32).max(1e-4)
 }
 
 #[cfg(test)]
@@ -145,14 +147,33 @@ mod tests {
     }
 
     #[test]
+    fn zoom_is_in_pixels_of_the_screen() {
+        let middle = |zoom, pixels_per_point| {
+            let view = View { zoom: Some(zoom), ..View::default() };
+            Placement::new(pane(), [64, 48], &view, pixels_per_point)
+        };
+        for pixels_per_point in [1.0, 1.5, 2.0] {
+            let placement = middle(1.0, pixels_per_point);
+            let on_screen_px = placement.rect().size() * pixels_per_point;
+            assert!((on_screen_px - vec2(64.0, 48.0)).length() < 1e-3, "{on_screen_px} at {pixels_per_point}");
+            let larger = zoomed(&View::default(), &placement, pane().center(), 2.0);
+            assert!((larger.zoom.expect("zoomed") - 2.0).abs() < 1e-6 && (middle(2.0, pixels_per_point).zoom() - 2.0).abs() < 1e-6);
+            let fitted = Placement::new(pane(), [64, 48], &View::default(), pixels_per_point);
+            assert_eq!((fitted.scale, fitted.zoom()), (10.0, 10.0 * pixels_per_point));
+        }
+        // However dense the screen is, the ends are the same.
+        assert_eq!(middle(1e9, 2.0).zoom(), ZOOM[1]);
+    }
+
+    #[test]
     fn what_is_under_the_cursor_stays_there() {
         let mut view = View::default();
         let at = pos2(300.0, 200.0);
         for factor in [1.5, 3.0, 0.4] {
-            let before = Placement::new(pane(), [64, 48], &view, 1e-3);
+            let before = Placement::new(pane(), [64, 48], &view, 1e3);
             let share = before.share(at);
             view = zoomed(&view, &before, at, factor);
-            let after = Placement::new(pane(), [64, 48], &view, 1e-3).share(at);
+            let after = Placement::new(pane(), [64, 48], &view, 1e3).share(at);
             assert!((share[0] - after[0]).abs() < 1e-4 && (share[1] - after[1]).abs() < 1e-4, "{share:?} {after:?}");
         }
     }

@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Role, Ui};
 
-use super::canvas;
+use super::canvas::{self, Placement};
 use crate::{
     engine::Stage,
     message::{Message, Outbox},
@@ -25,7 +25,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
             named(&gain, Role::Slider, "gain");
         }
         ui.separator();
-        zoom(ui, state, &mut view);
+        zoom(ui, &mut view);
     });
     let one = view.compare == Compare::Single;
     ui.horizontal_wrapped(|ui| {
@@ -55,13 +55,29 @@ fn stages(ui: &mut Ui, name: &str, of: &mut Stage) {
     }
 }
 
-fn zoom(ui: &mut Ui, state: &State, view: &mut View) {
-    let size_px = state.document.as_ref().map_or([640, 480], |document| document.scenario.camera.size_px);
-    let current = view.zoom.unwrap_or_else(|| canvas::fitting(ui.ctx().content_rect().size() * 0.5, size_px));
+/// Under which the zoom of the last pass is found.
+fn shown_zoom() -> egui::Id {
+    egui::Id::unique("zoom of the picture as it was shown")
+}
+
+/// How large the picture is in this pass, for the line above it in the next one: a fitted picture is as large as its pane has it.
+pub fn remember(ui: &Ui, placement: Option<&Placement>) {
+    if let Some(placement) = placement {
+        ui.data_mut(|data| data.insert_temp(shown_zoom(), placement.zoom()));
+    }
+}
+
+fn zoom(ui: &mut Ui, view: &mut View) {
+    let shown: Option<f32> = ui.data(|data| data.get_temp(shown_zoom()));
+    let current = view.zoom.or(shown).unwrap_or(1.0);
     if ui.selectable_label(view.zoom.is_none(), "fit").on_hover_text("the whole picture (F)").clicked() {
         view.zoom = None;
     }
-    if ui.selectable_label(view.zoom == Some(1.0), "1:1").on_hover_text("one point of the screen a pixel (1)").clicked() {
+    if ui
+        .selectable_label(view.zoom == Some(1.0), "1:1")
+        .on_hover_text("a pixel of the screen for each pixel of the picture, whatever the screen's scale (1)")
+        .clicked()
+    {
         *view = canvas::zoomed_in_place(view, 1.0, 1.0);
     }
     for (text, name, factor) in [("-", "zoom out", 0.5), ("+", "zoom in", 2.0)] {
@@ -71,7 +87,10 @@ fn zoom(ui: &mut Ui, state: &State, view: &mut View) {
             *view = canvas::zoomed_in_place(view, current, factor);
         }
     }
-    ui.weak(view.zoom.map_or_else(|| "fitted".to_owned(), |scale| format!("{:.0} %", 100.0 * scale)));
+    if view.zoom.is_some() || shown.is_some() {
+        ui.weak(format!("{:.0} %", 100.0 * view.zoom.unwrap_or(current)))
+            .on_hover_text("100 %: a pixel of the screen for each pixel of the picture");
+    }
 }
 
 fn overlays(ui: &mut Ui, view: &mut View) {
