@@ -68,10 +68,21 @@ fn ideal_color_at(at_px: vec2<f32>) -> vec4<f32> {
     return textureSampleLevel(ideal_color, ideal_sampler, at / size, 0.0);
 }
 
-// The same by a cubic spline: a bilinear read between pixels blurs. Softness 0 is Catmull-Rom's, which does not; 1 is the B-spline, with a
-// variance of a third of a square pixel. Its 4x4 texels are five bilinear reads; without the corners, whose weights are at most 0.4 % at
-// softness 0 and 0.8 % at 0.5. Twin: camsim_core::temporal::ColorImage::spline.
-fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
+// A cubic spline's 4x4 texels as five bilinear reads, without the corners, whose weights are at most 0.4 % at softness 0 and 0.8 % at 0.5: columns and rows of
+// the reads, from before the place to after it, and their weights. Softness 0 is Catmull-Rom's, which does not blur as a bilinear read between
+// pixels does; 1 is the B-spline, with a variance of a third of a square pixel. Twin: camsim_core::temporal::ColorImage::spline.
+struct Spline {
+    before: vec2<f32>,
+    between: vec2<f32>,
+    after: vec2<f32>,
+    weight_before: vec2<f32>,
+    weight_between: vec2<f32>,
+    weight_after: vec2<f32>,
+}
+
+const SPLINE_READS: u32 = 5u;
+
+fn spline_around(at_px: vec2<f32>, softness: vec2<f32>) -> Spline {
     let base = floor(at_px);
     let f = at_px - base;
     let g = 1.0 - f;
@@ -80,14 +91,35 @@ fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
     let w2 = mix(f * (0.5 + f * (2.0 - 1.5 * f)), (4.0 + g * g * (3.0 * g - 6.0)) / 6.0, softness);
     let w3 = mix(f * f * (-0.5 + 0.5 * f), f * f * f / 6.0, softness);
     let w12 = w1 + w2;
-    let before = base - 1.0;
-    let between = base + w2 / w12;
-    let after = base + 2.0;
-    let centre = w12.x * w12.y;
-    let sum = centre * ideal_color_at(between)
-        + w12.x * w0.y * ideal_color_at(vec2<f32>(between.x, before.y))
-        + w0.x * w12.y * ideal_color_at(vec2<f32>(before.x, between.y))
-        + w3.x * w12.y * ideal_color_at(vec2<f32>(after.x, between.y))
-        + w12.x * w3.y * ideal_color_at(vec2<f32>(between.x, after.y));
-    return sum / (centre + w12.x * (w0.y + w3.y) + w12.y * (w0.x + w3.x));
+    // All five together: nothing is lost with the corners.
+    let all = w12.x * w12.y + w12.x * (w0.y + w3.y) + w12.y * (w0.x + w3.x);
+    let part = inverseSqrt(all);
+    return Spline(base - 1.0, base + w2 / w12, base + 2.0, part * w0, part * w12, part * w3);
+}
+
+struct SplineRead {
+    at_px: vec2<f32>,
+    weight: f32,
+}
+
+// The one between, the ones above and below it, the ones left and right of it.
+fn spline_read(spline: Spline, read: u32) -> SplineRead {
+    let before = vec2<bool>(read == 3u, read == 1u);
+    let after = vec2<bool>(read == 4u, read == 2u);
+    let at_px = select(select(spline.between, spline.before, before), spline.after, after);
+    let weight = select(select(spline.weight_between, spline.weight_before, before), spline.weight_after, after);
+    return SplineRead(at_px, weight.x * weight.y);
+}
+
+fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
+    let spline = spline_around(at_px, softness);
+    return color_of(spline_read(spline, 0u))
+        + color_of(spline_read(spline, 1u))
+        + color_of(spline_read(spline, 2u))
+        + color_of(spline_read(spline, 3u))
+        + color_of(spline_read(spline, 4u));
+}
+
+fn color_of(read: SplineRead) -> vec4<f32> {
+    return read.weight * ideal_color_at(read.at_px);
 }

@@ -324,7 +324,7 @@ impl<'a> Pipeline<'a> {
         if let Some(flow) = &self.flow {
             let source_from_look = flow.source_from_look(source.at_px, self.flow_share(dt_s - self.frame.instant_s));
             let [dx, dy] = pixel.map(|d| source_from_look * (self.frame.geometry.focal_px * (uv_from_px * d)));
-            return Footprint::new(dx, dy, TapStage::Grid { most: MAX_TAPS });
+            return Footprint::new(dx, dy, TapStage::SplineOrGrid { most: MAX_TAPS });
         }
         let (rotation, shift) = self.motion.key_from(dt_s, self.frame.instant_s);
         let p = rotation * uv.extend(1.0) + source.inverse_depth * shift;
@@ -333,7 +333,7 @@ impl<'a> Pipeline<'a> {
             self.frame.geometry.focal_px * (moved.truncate() - p.truncate() * (moved.z / p.z)) / p.z
         };
         let [dx, dy] = pixel.map(step);
-        Footprint::new(dx, dy, TapStage::Grid { most: MAX_TAPS })
+        Footprint::new(dx, dy, TapStage::SplineOrGrid { most: MAX_TAPS })
     }
 
     /// Nodes so that no chord misses the path by more than [`CHORD_MISS_PX`], seen at a grid of pixels. The miss falls with the square of

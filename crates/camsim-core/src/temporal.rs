@@ -281,8 +281,13 @@ pub enum TapStage {
     Bilinear,
     /// One read of a cubic spline, as soft as the pixel is wide.
     Spline,
-    /// The same where a pixel is up to sqrt 3 ideal pixels wide, a grid of bilinear reads where it is wider.
+    /// A grid of bilinear reads; one of them where a pixel is up to sqrt 3 ideal pixels wide.
     Grid {
+        /// Reads along a side, at most.
+        most: u32,
+    },
+    /// The same, but for the spline where a pixel is so narrow.
+    SplineOrGrid {
         /// Reads along a side, at most.
         most: u32,
     },
@@ -290,7 +295,7 @@ pub enum TapStage {
 
 /// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has this variance (times 12), 1 of
 /// the ideal pixel and 2 of the tent.
-const TENT_PX2: f64 = 3.0;
+pub(crate) const TENT_PX2: f64 = 3.0;
 
 /// Reads of an output pixel in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -310,7 +315,7 @@ impl Footprint {
     #[must_use]
     pub fn new(dx: DVec2, dy: DVec2, stage: TapStage) -> Self {
         let most = match stage {
-            TapStage::Grid { most } => most.max(1),
+            TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most.max(1),
             TapStage::Bilinear | TapStage::Spline => 1,
         };
         let taps = [dx, dy].map(|side| match side.length_squared() > TENT_PX2 {
@@ -318,7 +323,8 @@ impl Footprint {
             false => 1,
         });
         let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
-        let spline = (stage != TapStage::Bilinear && taps == [1, 1]).then(|| DVec2::new(softness(dx), softness(dy)));
+        let has_spline = matches!(stage, TapStage::Spline | TapStage::SplineOrGrid { .. });
+        let spline = (has_spline && taps == [1, 1]).then(|| DVec2::new(softness(dx), softness(dy)));
         let [dx, dy] = [(dx, taps[0]), (dy, taps[1])].map(|(side, taps)| spread(side, taps));
         Self { dx, dy, taps, spline }
     }
@@ -457,11 +463,15 @@ mod tests {
             (0..16).map(|k| gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
         };
         for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
-            let found = mean(width_px, TapStage::Grid { most: 4 });
+            let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
             assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
         }
-        // What one bilinear read is off by.
+        // What one bilinear read is off by, and that a grid is the same where it has several.
         assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
+        for [width_px, is_off_by] in [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]] {
+            let found = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
+            assert!((found - is_off_by).abs() < 2e-3, "{width_px}: {found} {is_off_by}");
+        }
     }
 
     #[test]

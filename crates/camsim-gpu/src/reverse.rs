@@ -349,7 +349,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px as f32),
         max_samples: plan.blur.map_or(1, |blur| blur.max_samples),
         max_taps: match plan.taps {
-            TapStage::Grid { most } => most,
+            TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
             TapStage::Bilinear | TapStage::Spline => 1,
         },
         coords_phase,

@@ -21,8 +21,10 @@ fn samples_for(length_px: f32, at_least: u32) -> u32 {
 // Mean of so many samples along a polynomial; `first_tap` were taken before.
 fn mean_along(curve: Curve, count: u32, area: Footprint, first_tap: u32) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
-    for (var i = 0u; i < count; i++) {
-        sum += tap_color(area, along(curve, f32(STEPS) * (f32(i) + 0.5) / f32(count)), first_tap + i);
+    let reads = reads_of(area, count);
+    for (var i = 0u; i < reads; i++) {
+        let sample = sample_of(area, i);
+        sum += tap_color(area, along(curve, f32(STEPS) * (f32(sample) + 0.5) / f32(count)), first_tap + sample, i);
     }
     return sum / f32(count);
 }

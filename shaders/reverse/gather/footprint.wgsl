@@ -10,6 +10,8 @@ struct Footprint {
     taps: vec2<u32>,
 }
 
+// Of `samples` samples, which the reads of each add up to: how many reads they take (`reads_of`), to which of them a read belongs (`sample_of`), and the
+// read's share of it (`tap_color`, where `tap` is the sample's number in the whole exposure).
 #import <slot:tap>
 
 fn stretches(ray: Ray) -> vec2<f32> {

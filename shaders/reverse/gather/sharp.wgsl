@@ -10,8 +10,9 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let area = footprint(ray);
     let taps = area.taps.x * area.taps.y;
     var sum = vec4<f32>(0.0);
-    for (var i = 0u; i < taps; i++) {
-        sum += tap_color(area, source.at_px, i);
+    let reads = reads_of(area, taps);
+    for (var i = 0u; i < reads; i++) {
+        sum += tap_color(area, source.at_px, sample_of(area, i), i);
     }
     return Gathered(sum / f32(taps), source.inside, array(source.far_px, source.far_px));
 }

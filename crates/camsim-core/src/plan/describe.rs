@@ -143,7 +143,8 @@ impl FramePlan {
         let taps = match self.taps {
             TapStage::Bilinear => "bilinear".to_owned(),
             TapStage::Spline => "spline".to_owned(),
-            TapStage::Grid { most } => format!("spline, or up to {most}x{most} taps a pixel"),
+            TapStage::Grid { most } => format!("up to {most}x{most} taps a pixel"),
+            TapStage::SplineOrGrid { most } => format!("spline, or up to {most}x{most} taps a pixel"),
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
         passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}) -> photometric{truth}"));

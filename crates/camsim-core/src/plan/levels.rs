@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     scenario::{Auto, Preset, QualitySpec},
-    temporal::{Footprint, TapStage, samples_for},
+    temporal::{Footprint, TENT_PX2, TapStage, samples_for},
 };
 
 /// One place in so many is asked first, and so far above the tolerance these then settle it.
@@ -41,6 +41,8 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 4;
+/// Those that are tried.
+const CAPS: [u32; 3] = [2, 3, MOST_TAPS];
 /// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], a read of the spline of a sharp picture, and of one
 /// with an exposure, where the whole path is laid out for it first. From frame times on llvmpipe with 2 to 16 samples and ideal frames of
 /// 1 to 4 times the pixels, one such read 2.4 ms at 640x480.
@@ -233,15 +235,23 @@ impl Prospect<'_> {
 
     /// Ways of reading the ideal frame at a scale.
     fn stages(&self, quality: &QualitySpec, scale: f64) -> Vec<TapStage> {
-        let widest = scale * self.widest;
-        let most = |cap: u32| if widest > 3_f64.sqrt() { TapStage::Grid { most: cap.min(widest.ceil() as u32) } } else { TapStage::Spline };
+        // By their longer sides: whether any pixel has one read, and whether any has several.
+        let [is_any_narrow, is_any_wide] = [scale * self.widths[0] <= TENT_PX2.sqrt(), scale * self.widths[1] > TENT_PX2.sqrt()];
+        let most = |cap: u32| cap.min((scale * self.widths[1]).ceil() as u32);
+        let grid = |cap: u32| TapStage::Grid { most: most(cap) };
+        let finest = |cap: u32| match (is_any_narrow, is_any_wide) {
+            (_, false) => TapStage::Spline,
+            (true, true) => TapStage::SplineOrGrid { most: most(cap) },
+            (false, true) => grid(cap),
+        };
         match quality.footprint_taps.value() {
             Some(1) => vec![TapStage::Spline],
-            Some(taps) => vec![most(taps)],
+            Some(taps) => vec![finest(taps)],
             // Bilinear reads farther apart than a pixel leave less to be read, and for borders mostly do.
             None => {
                 let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
-                stages.extend([2, 3, MOST_TAPS].map(most));
+                stages.extend(CAPS.map(grid).into_iter().filter(|_| is_any_wide));
+                stages.extend(CAPS.map(finest).into_iter().filter(|_| is_any_wide && is_any_narrow));
                 stages.dedup();
                 stages
             }

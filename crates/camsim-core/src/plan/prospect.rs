@@ -45,8 +45,8 @@ pub(super) struct Prospect<'a> {
     pub counted: usize,
     /// Of the camera, and but for whole pixels of every ideal frame.
     pub principal_px: DVec2,
-    /// Widest output pixel, camera px.
-    pub widest: f64,
+    /// Narrowest and widest output pixel, camera px.
+    pub widths: [f64; 2],
     pub has_terrain: bool,
 }
 
@@ -97,9 +97,9 @@ impl<'a> Prospect<'a> {
             let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
             sides.x_axis.length().max(sides.y_axis.length())
         };
-        let widest = probes.iter().map(width).fold(0.0, f64::max);
+        let widths = probes.iter().map(width).fold([f64::INFINITY, 0.0], |[least, most], width| [width.min(least), width.max(most)]);
         let has_terrain = sequence.scene.terrain.is_some();
-        Self { sights: few_of(sights), has_terrain, counted, principal_px: reach.camera.principal_point_px, widest }
+        Self { sights: few_of(sights), has_terrain, counted, principal_px: reach.camera.principal_point_px, widths }
     }
 }
 

@@ -26,6 +26,7 @@ pub enum TapKind {
     Bilinear,
     Spline,
     Grid,
+    SplineOrGrid,
 }
 
 impl From<TapStage> for TapKind {
@@ -34,6 +35,7 @@ impl From<TapStage> for TapKind {
             TapStage::Bilinear => Self::Bilinear,
             TapStage::Spline => Self::Spline,
             TapStage::Grid { .. } => Self::Grid,
+            TapStage::SplineOrGrid { .. } => Self::SplineOrGrid,
         }
     }
 }
@@ -181,7 +183,7 @@ impl PipelineKey {
                             .flat_map(|depths| PathStage::ALL.map(|path| (depths, path)))
                             .filter(|&(depths, path)| looks_up || depths == NodeDepths::Each && (blur || path == PathStage::Straight));
                         for (depths, path) in exposures {
-                            for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid] {
+                            for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid, TapKind::SplineOrGrid] {
                                 let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
                                 let looks: &[Looks] = if parallax { &Looks::ALL } else { &[Looks::Several] };
                                 let stretches: &[bool] = if blur { &[false, true] } else { &[false] };
@@ -269,6 +271,7 @@ impl PipelineKey {
             TapKind::Bilinear => "reverse/gather/tap/bilinear.wgsl",
             TapKind::Spline => "reverse/gather/tap/spline.wgsl",
             TapKind::Grid => "reverse/gather/tap/grid.wgsl",
+            TapKind::SplineOrGrid => "reverse/gather/tap/spline_or_grid.wgsl",
         };
         let (depth, color) = match self.paper {
             false => ("reverse/depth/bilinear.wgsl", "reverse/color/linear.wgsl"),
