@@ -39,6 +39,7 @@ embedded![
     "ideal/reach.wgsl",
     "ideal/reads/four.wgsl",
     "ideal/reads/grid.wgsl",
+    "ideal/reads/one.wgsl",
     "ideal/reads/two.wgsl",
     "ideal/spread/none.wgsl",
     "ideal/spread/samples.wgsl",

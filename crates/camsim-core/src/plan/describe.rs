@@ -80,6 +80,7 @@ impl FramePlan {
             }
         };
         let reads = match self.surface_reads {
+            SurfaceReads::One => "1 texture read a pixel",
             SurfaceReads::Two => "2 texture reads a pixel",
             SurfaceReads::Four => "4 texture reads a pixel",
             SurfaceReads::Grid => "up to 2x32 texture reads a pixel",

@@ -46,7 +46,7 @@ const CAPS: [u32; 3] = [2, 3, MOST_TAPS];
 /// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], a read of the spline of a sharp picture, and of one
 /// with an exposure, where the whole path is laid out for it first. From frame times on llvmpipe with 2 to 16 samples and ideal frames of
 /// 1 to 4 times the pixels, one such read 2.4 ms at 640x480.
-const IDEAL_COSTS: [f64; 3] = [4.3, 5.6, 8.0];
+const IDEAL_COSTS: [f64; 4] = [3.0, 4.3, 5.6, 8.0];
 /// Of terrain's triangles: for an ideal frame of one pixel for each of the camera's, and for each ideal pixel, since a finer frame shows more of
 /// them. From the ideal pass of benches/all_effects.toml at scales of 1, 1.41 and 2: 120, 168 and 349 ms.
 const TERRAIN_COSTS: [f64; 2] = [7.5, 4.0];
@@ -238,20 +238,18 @@ impl Prospect<'_> {
         // By their longer sides: whether any pixel has one read, and whether any has several.
         let [is_any_narrow, is_any_wide] = [scale * self.widths[0] <= TENT_PX2.sqrt(), scale * self.widths[1] > TENT_PX2.sqrt()];
         let most = |cap: u32| cap.min((scale * self.widths[1]).ceil() as u32);
-        let grid = |cap: u32| TapStage::Grid { most: most(cap) };
-        let finest = |cap: u32| match (is_any_narrow, is_any_wide) {
+        let most_of = |cap: u32| match (is_any_narrow, is_any_wide) {
             (_, false) => TapStage::Spline,
             (true, true) => TapStage::SplineOrGrid { most: most(cap) },
-            (false, true) => grid(cap),
+            (false, true) => TapStage::Grid { most: most(cap) },
         };
         match quality.footprint_taps.value() {
             Some(1) => vec![TapStage::Spline],
-            Some(taps) => vec![finest(taps)],
+            Some(taps) => vec![most_of(taps)],
             // Bilinear reads farther apart than a pixel leave less to be read, and for borders mostly do.
             None => {
                 let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
-                stages.extend(CAPS.map(grid).into_iter().filter(|_| is_any_wide));
-                stages.extend(CAPS.map(finest).into_iter().filter(|_| is_any_wide && is_any_narrow));
+                stages.extend(CAPS.map(most_of));
                 stages.dedup();
                 stages
             }

@@ -37,6 +37,8 @@ pub enum TemporalStage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceReads {
+    /// One, of a version of the picture for the pixel's longer axis.
+    One,
     /// Two reads along the pixel's longer axis.
     Two,
     /// Four: two by two, or in a row where the pixel is long.
@@ -47,7 +49,7 @@ pub enum SurfaceReads {
 
 impl SurfaceReads {
     /// All of them, each at its own number.
-    pub const ALL: [Self; 3] = [Self::Two, Self::Four, Self::Grid];
+    pub const ALL: [Self; 4] = [Self::One, Self::Two, Self::Four, Self::Grid];
 }
 
 /// Where the key frame's depth is looked up that the nodes of an exposure take.

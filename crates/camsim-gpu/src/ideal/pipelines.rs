@@ -18,6 +18,7 @@ use crate::{
 /// What fills the surfaces' slot.
 pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
     let file = match reads {
+        SurfaceReads::One => "ideal/reads/one.wgsl",
         SurfaceReads::Two => "ideal/reads/two.wgsl",
         SurfaceReads::Four => "ideal/reads/four.wgsl",
         SurfaceReads::Grid => "ideal/reads/grid.wgsl",
@@ -80,7 +81,7 @@ impl IdealPass {
         let (reads, samples, format) = match key {
             SurfaceKey::Plain(reads) => (reads, 1, Some(self.color_format)),
             // Nothing is read for depth, but for holes.
-            SurfaceKey::FineDepth => (SurfaceReads::Two, FINE_SAMPLES, None),
+            SurfaceKey::FineDepth => (SurfaceReads::One, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
         let of_ground = [reads_slot(reads), picture_slot(self.has_tiles)];

@@ -60,6 +60,8 @@ impl Reads {
     /// As in shaders/ideal/reads, with a texel and a half for the bilinear read itself.
     fn of(reads: SurfaceReads) -> Self {
         match reads {
+            // Where the pixel is.
+            SurfaceReads::One => Self { of_longer: 1.0, of_shorter: 1.0, reach: 1.5 },
             // Off by 0.29 of the longer axis, in a version of at least 0.18 of it.
             SurfaceReads::Two => Self { of_longer: 0.5, of_shorter: 1.0, reach: 3.5 },
             // Off by 0.39 of it, in one of at least 0.09, or by half of its diagonal.
