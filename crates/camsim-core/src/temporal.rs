@@ -4,17 +4,20 @@
 //! [`displacement`] and [`paper`].
 
 use glam::{DMat3, DVec2, DVec3};
-use serde::Serialize;
 
 use crate::plan::{NodeDepths, PathStage};
 
 pub mod displacement;
 pub mod edges;
 pub mod fine;
+mod footprint;
 pub mod lines;
 pub mod marks;
 pub mod paper;
 pub mod path;
+
+pub(crate) use footprint::TENT_PX2;
+pub use footprint::{Footprint, TapStage};
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -273,93 +276,6 @@ impl ColorImage<'_> {
     }
 }
 
-/// What reads the ideal frame for one sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum TapStage {
-    /// One bilinear read.
-    Bilinear,
-    /// One read of a cubic spline, as soft as the pixel is wide.
-    Spline,
-    /// A grid of bilinear reads; one of them where a pixel is up to sqrt 3 ideal pixels wide.
-    Grid {
-        /// Reads along a side, at most.
-        most: u32,
-    },
-    /// The same, but for the spline where a pixel is so narrow.
-    SplineOrGrid {
-        /// Reads along a side, at most.
-        most: u32,
-    },
-}
-
-/// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has this variance (times 12), 1 of
-/// the ideal pixel and 2 of the tent.
-pub(crate) const TENT_PX2: f64 = 3.0;
-
-/// Reads of an output pixel in the ideal frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Footprint {
-    /// Extent of the grid of reads along x and y, ideal pixels: the pixel's own, less what each read covers, so that the variances agree.
-    pub dx: DVec2,
-    /// See above.
-    pub dy: DVec2,
-    /// Reads along each.
-    pub taps: [u32; 2],
-    /// Softness of the one spline; `None` for bilinear reads.
-    pub spline: Option<DVec2>,
-}
-
-impl Footprint {
-    /// Of a pixel with the sides `dx` and `dy`, columns of d(ideal px)/d(output px).
-    #[must_use]
-    pub fn new(dx: DVec2, dy: DVec2, stage: TapStage) -> Self {
-        let most = match stage {
-            TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most.max(1),
-            TapStage::Bilinear | TapStage::Spline => 1,
-        };
-        let taps = [dx, dy].map(|side| match side.length_squared() > TENT_PX2 {
-            true => ((side.length() - 0.1).ceil() as u32).clamp(1, most),
-            false => 1,
-        });
-        let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
-        let has_spline = matches!(stage, TapStage::Spline | TapStage::SplineOrGrid { .. });
-        let spline = (has_spline && taps == [1, 1]).then(|| DVec2::new(softness(dx), softness(dy)));
-        let [dx, dy] = [(dx, taps[0]), (dy, taps[1])].map(|(side, taps)| spread(side, taps));
-        Self { dx, dy, taps, spline }
-    }
-
-    /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels. Each tap is followed by the one opposite, so that any even number of
-    /// them has the centre as its mean.
-    #[must_use]
-    pub fn offset_px(&self, i: u32) -> DVec2 {
-        let [nx, ny] = self.taps;
-        let turn = i % (nx * ny);
-        let place = if turn % 2 == 1 { nx * ny - 1 - turn / 2 } else { turn / 2 };
-        let fx = (f64::from(place % nx) + 0.5) / f64::from(nx) - 0.5;
-        let fy = (f64::from(place / nx) + 0.5) / f64::from(ny) - 0.5;
-        self.dx * fx + self.dy * fy
-    }
-
-    /// Colour of tap `i` around a source.
-    #[must_use]
-    pub fn tap_color(&self, color: &ColorImage<'_>, source_px: DVec2, i: u32) -> DVec3 {
-        match self.spline {
-            Some(softness) => color.spline(source_px, softness),
-            None => color.sample(source_px + self.offset_px(i)),
-        }
-    }
-}
-
-/// `n` reads evenly over a length d have the variance `d^2 (1 - 1/n^2) / 12`.
-fn spread(side: DVec2, taps: u32) -> DVec2 {
-    if taps == 1 {
-        return DVec2::ZERO;
-    }
-    let length2 = side.length_squared();
-    side * ((length2 - TENT_PX2).max(0.0) / (1.0 - f64::from(taps * taps).recip()) / length2).sqrt()
-}
-
 /// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each polynomial of the path has its
 /// samples uniformly in time, in the middles of equal parts, and at most `cap` of them.
 #[must_use]
@@ -447,31 +363,6 @@ mod tests {
             assert!((color.spline(at, DVec2::splat(0.3)).y - 0.5).abs() < 1e-12, "a constant stays");
         }
         assert!(spline < 0.1 * bilinear, "{spline:.2e} {bilinear:.2e}");
-    }
-
-    #[test]
-    fn reads_have_the_variance_of_the_pixel_that_they_stand_for() {
-        // A parabola's mean over an area tells its variance.
-        let size_px = [40, 40];
-        let parabola = |i: u32| (f64::from(i % 40) - 20.0).powi(2) + 1.0 / 12.0;
-        let rgba: Vec<f32> = (0..1600).flat_map(|i| [parabola(i) as f32, 0.0, 0.0, 1.0]).collect();
-        let color = ColorImage { size_px, rgba: &rgba };
-        let mean = |width_px: f64, stage: TapStage| {
-            let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
-            let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
-            // Over all positions between the pixels, less the parabola at the centre.
-            (0..16).map(|k| gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
-        };
-        for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
-            let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
-            assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
-        }
-        // What one bilinear read is off by, and that a grid is the same where it has several.
-        assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
-        for [width_px, is_off_by] in [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]] {
-            let found = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
-            assert!((found - is_off_by).abs() < 2e-3, "{width_px}: {found} {is_off_by}");
-        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ struct Footprint {
     // Softness of the spline along x and y.
     softness: vec2<f32>,
     taps: vec2<u32>,
+    // The order of the taps, if the tap slot has one.
+    turns: vec2<u32>,
 }
 
 // Of `samples` samples, which the reads of each add up to: how many reads they take (`reads_of`), to which of them a read belongs (`sample_of`), and the
