@@ -13,7 +13,11 @@ use std::{
 
 use glam::DVec2;
 
-use super::{contours::Search, probes::Probe, surfaces::Light};
+use super::{
+    contours::Search,
+    probes::Probe,
+    surfaces::{Light, Met},
+};
 use crate::{
     silhouette::{bends, may_step, steps},
     temporal::marks::FINE_EDGE_STEP,
@@ -31,13 +35,27 @@ pub(super) struct Crossed {
     pub borders: u32,
     /// Squared contrast, of the linear range, times the length of borders, pixels, in each pixel of the area that the lines stand for.
     pub steps: f64,
-    /// The same of borders between meshes that touch, as a window and its wall do: depth tells nothing of them, so that rays leave
-    /// them as they are; and of what is mixed with what is behind it, where it has no depth.
+    /// The same of borders between meshes that touch, as a window and its wall do, and of colours within one: depth tells nothing of them, so that rays
+    /// leave them as they are; and of what is mixed with what is behind it, where it has no depth.
     pub flush: f64,
     /// The same where depth bends between them, as at a wall's foot: samples finer than a pixel find that, the middles of pixels do not.
     pub feet: f64,
     /// All three as a look once a pixel has them: what is narrower is not there.
     pub once_a_pixel: f64,
+}
+
+/// From place to place a mesh has another colour, whatever is painted on it, if that changes by more than this, linear: its corners have no colours in common, or
+/// light falls on it from another side. Colours that change gradually do so by less over a third of a pixel.
+const OTHER_TINT: f64 = 0.02;
+
+/// Whether two places that see no step of depth between them are of different meshes, or of parts of one that have different colours.
+fn is_another(a: Option<&Met>, b: Option<&Met>) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    match (a.surface, b.surface) {
+        (0, _) | (_, 0) => false,
+        (one, other) if one != other => true,
+        _ => (a.tint - b.tint).abs().max_element() > OTHER_TINT,
+    }
 }
 
 /// The ways that lines run in: along the row and the column of a probe, and along its diagonals.
@@ -72,11 +90,10 @@ impl Search<'_> {
                 let between = |share: f64| meet(k as f64 + share).map_or(0.0, |met| met.depth_m.recip());
                 let between_places = |from: usize, to: usize| (light(from).color - light(to).color).length_squared() / 3.0;
                 let square = || between_places(k, k + 1);
-                let mesh = |k: usize| met[k].as_ref().map_or(0, |met| met.surface);
                 if may && steps(inverse_depths[k], inverse_depths[k + 1], between) {
                     borders += 1;
                     contrast2 += square();
-                } else if mesh(k) != mesh(k + 1) && mesh(k) * mesh(k + 1) > 0 {
+                } else if is_another(met[k].as_ref(), met[k + 1].as_ref()) {
                     let side = if either(&|depths| bends(depths, APART_PX * FINE_EDGE_STEP)) { &mut feet2 } else { &mut flush2 };
                     *side += square();
                 } else if self.surfaces.blends() && light(k).panes != light(k + 1).panes {

@@ -387,19 +387,30 @@ pub(super) mod tests {
     #[test]
     fn meshes_that_touch_have_borders_that_rays_leave() {
         // White and black stripes of 2 m in one plane, which are 4 px, along the rows and across them.
-        let stripes = |byte: u8, first: i32| {
+        let stripes = |tints: &dyn Fn(i32) -> Option<[f32; 2]>| {
             let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-            for k in -40..40 {
-                let (at, from) = (2 * (2 * k + first), vertices.len() as u32);
-                let corner = |along: f32, across: i32| {
-                    MeshVertex::new([0.6 * along - 0.8 * across as f32, 0.8 * along + 0.6 * across as f32, 0.0], [0.0; 2])
+            for (k, tints) in (-80..80).filter_map(|k| Some((k, tints(k)?))) {
+                let from = vertices.len() as u32;
+                let corner = |along: f32, across: i32, tint: f32| {
+                    let place = [0.6 * along - 0.8 * across as f32, 0.8 * along + 0.6 * across as f32, 0.0];
+                    MeshVertex { tint: [tint, tint, tint, 1.0], ..MeshVertex::new(place, [0.0; 2]) }
                 };
-                vertices.extend([corner(-200.0, at), corner(200.0, at), corner(200.0, at + 2), corner(-200.0, at + 2)]);
+                let [low, high] = [(2 * k, tints[0]), (2 * k + 2, tints[1])];
+                vertices.extend(
+                    [(-200.0, low), (200.0, low), (200.0, high), (-200.0, high)].map(|(along, (at, tint))| corner(along, at, tint)),
+                );
                 indices.extend([0, 1, 2, 0, 2, 3].map(|corner| from + corner));
             }
-            Mesh::new(vertices, indices, plain(byte), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp)
+            Mesh::new(vertices, indices, plain(255), DVec3::new(0.0, 0.0, -50.0), Wrap::Clamp)
         };
-        let found = outlook_on(vec![stripes(255, 0), stripes(0, 1)], 0.0, 1.0, Holes::default());
+        let of_number = |k: i32| [(k % 2 == 0) as u8 as f32; 2];
+        let only = |odd: i32| move |k: i32| (k.rem_euclid(2) == odd).then(|| of_number(k));
+        let found = outlook_on(vec![stripes(&only(0)), stripes(&only(1))], 0.0, 1.0, Holes::default());
+        // The same in one mesh, by the colours of its corners; where those change gradually there is no border.
+        let in_one = outlook_on(vec![stripes(&|k| Some(of_number(k)))], 0.0, 1.0, Holes::default());
+        assert_eq!((in_one.flush, in_one.steps), (found.flush, 0.0));
+        let gradual = outlook_on(vec![stripes(&|k| Some([k, k + 1].map(|k| 0.5 + k as f32 / 320.0)))], 0.0, 1.0, Holes::default());
+        assert_eq!((gradual.flush, gradual.steps), (0.0, 0.0));
         let expected = UNSURE_OF_ALL * SAFETY * SAFETY / 4.0;
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.steps, 0.0);

@@ -1,7 +1,6 @@
 //! How a frame's picture is made: what reads the ideal frame and how fine that is, and whether pixels at silhouettes have rays of their own.
 
 use super::{
-    BlurStage,
     contours::{Contours, Outlook},
     edges,
     levels::{Choice, FINEST_SCALE, MOST_SCALE, NEARLY, Sampling, Task},
@@ -49,10 +48,14 @@ impl Look<'_> {
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
             return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
         };
-        let plain = || match given {
+        let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
-            None => prospect.choose(&task, &|sampling, blur| Some(plain_dn(outlook, &task, sampling, blur)?.hypot(layers_dn))),
+            None => prospect.choose(&task, &|sampling, blur| {
+                let plain = is_up_to(FINEST_SCALE, sampling.scale, &task).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
+                Some(plain.error_dn.hypot(layers_dn))
+            }),
         };
+        let plain = || plain_if(&|plain| quality.silhouettes == Silhouettes::Plain || plain.are_affordable(max_error_dn));
         let with_rays = || {
             let most_fine = |scale: f64| {
                 let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
@@ -70,6 +73,8 @@ impl Look<'_> {
                     (plain, true, 1)
                 } else {
                     let (with_rays, fine) = with_rays();
+                    // Where nothing keeps the tolerance silhouettes may take all of it.
+                    let plain = if plain.within || with_rays.within { plain } else { plain_if(&|_| true) };
                     let is_as_good = if with_rays.within { plain.within } else { plain.total_dn <= NEARLY * with_rays.total_dn };
                     let is_plain = plain.within && !with_rays.within || is_as_good && plain.price < with_rays.price;
                     (if is_plain { plain } else { with_rays }, is_plain, fine)
@@ -103,15 +108,6 @@ impl Look<'_> {
 /// Whether a scale is not above a usual one; those that are asked for, or the lens needs, always are.
 fn is_up_to(most_scale: f64, scale: f64, task: &Task<'_>) -> bool {
     scale <= task.least_scale.max(most_scale) || task.quality.ideal_scale.value().is_some()
-}
-
-/// Error over the picture of silhouettes that are left as they are; `None` where that is not to be.
-fn plain_dn(outlook: &Outlook, task: &Task<'_>, sampling: &Sampling, blur: Option<BlurStage>) -> Option<f64> {
-    if !is_up_to(FINEST_SCALE, sampling.scale, task) {
-        return None;
-    }
-    let plain = outlook.plain(sampling, blur);
-    (task.quality.silhouettes == Silhouettes::Plain || plain.are_affordable(task.max_error_dn)).then_some(plain.error_dn)
 }
 
 /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
