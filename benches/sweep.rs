@@ -1,15 +1,21 @@
 //! What a frame of `benches/all_effects.toml` costs by size, by length of blur, by effect and by file format, each table with the paper's
-//! preset of the same frames in the same rounds.
+//! preset of the same frames in the same rounds; and what the houses of `benches/houses.toml` add to their terrain.
 //!
 //! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `passes`,
-//! `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+//! `houses`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 
 use std::{convert::Infallible, path::PathBuf, process::Command, sync::Arc, time::Duration};
 
 use camsim::{
-    core::{frame::COORDS_CHANNELS, scenario::Channel, sequence::Sequence},
+    core::{
+        frame::COORDS_CHANNELS,
+        plan::FramePlan,
+        scenario::Channel,
+        scene::{ModelDetail, SceneLevels},
+        sequence::Sequence,
+    },
     gpu::{AdapterChoice, Engine},
     io::{load::load_sequence, scenario_file::read_scenario},
     lab::timing::{peak_memory_mb, quartiles},
@@ -25,6 +31,7 @@ use flight::{
 const EFFORT: Effort = Effort { burst: 8, rounds: 25, budget: Duration::from_secs(90) };
 /// Large frames take seconds.
 const EFFORT_LARGE: Effort = Effort { burst: 4, rounds: 9, budget: Duration::from_secs(120) };
+const EFFORT_HOUSES: Effort = Effort { burst: 8, rounds: 5, budget: Duration::from_secs(60) };
 /// The paper's preset, as it is called in the tables.
 const PRESET: &str = "the paper's preset";
 /// Of files: programs run one after the other, so many times.
@@ -38,7 +45,9 @@ fn main() -> Outcome<()> {
     let engine = Engine::new(AdapterChoice::Best)?;
     println!("adapter   {}", engine.gpu().adapter);
     println!("frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table");
-    for (name, table) in [("size", size as fn(&Engine, bool) -> Outcome<()>), ("blur", blur), ("effects", effects), ("passes", passes)] {
+    for (name, table) in
+        [("size", size as fn(&Engine, bool) -> Outcome<()>), ("blur", blur), ("effects", effects), ("passes", passes), ("houses", houses)]
+    {
         if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
             table(&engine, is_measuring)?;
         }
@@ -183,6 +192,72 @@ fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     Ok(())
 }
 
+/// Pitch angles of the mount from which houses are looked at, degrees.
+const PITCHES_DEG: [f64; 3] = [-35.0, -50.0, -65.0];
+/// Scale of the ideal frame where terrain and houses are to be sampled alike.
+const ALIKE: f64 = 2.83;
+
+/// Terrain with 5000 houses on it beside the terrain alone: as the plan makes each of them, and both from ideal frames of one scale without rays.
+fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    println!(
+        "\nbenches/houses.toml: terrain with 5000 houses beside the terrain alone; houses in view, scales and predicted errors are those of frame 40\n"
+    );
+    println!(
+        "| mount, sampling | houses in view | scales | 1/255, predicted | terrain, processor ms a frame | with houses | times | ms a frame | with houses | times |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|");
+    let alike = [("quality.ideal_scale", ALIKE.to_string()), ("quality.silhouettes", "\"plain\"".to_owned())];
+    for pitch_deg in PITCHES_DEG.into_iter().take(if is_measuring { PITCHES_DEG.len() } else { 1 }) {
+        for (way, sets) in [("as planned", &[][..]), ("alike", &alike)] {
+            let pitch = ("camera.mount.angles_deg", format!("[0.0, {pitch_deg:?}, 0.0]"));
+            let with_houses = sequence_of("benches/houses.toml", &[&[pitch], sets].concat())?;
+            let mut terrain = Sequence::clone(&with_houses);
+            Arc::make_mut(&mut terrain.scene).meshes.clear();
+            let mut variants = [Arc::new(terrain), with_houses]
+                .map(|sequence| Variant::open("", engine, sequence, &[Channel::Color]))
+                .into_iter()
+                .collect::<Outcome<Vec<_>>>()?;
+            let plans = [0, 1].map(|i| plan_of(&mut variants[i])).into_iter().collect::<Outcome<Vec<_>>>()?;
+            let effort = effort(EFFORT_HOUSES, is_measuring);
+            measure(&mut variants, 96, effort)?;
+            let both = |of: &dyn Fn(&FramePlan) -> String| plans.iter().map(of).collect::<Vec<_>>().join(", ");
+            let scales = both(&|plan| format!("{:.2}", plan.ideal.focal_px.x / plan.camera.focal_px.x));
+            let dn = both(&|plan| format!("{:.2}", predicted_dn(plan)));
+            let [terrain, houses] = [0, 1].map(|i| &variants[i]);
+            let pair = |of: &dyn Fn(&Variant<'_>) -> Vec<f64>| {
+                let [alone, with] = [of(terrain), of(houses)].map(|ms| (format!("{:.0}", quartiles(&ms)[1]), ms));
+                format!("{} | {} | {:.2}", alone.0, with.0, ratio(&with.1, &alone.1))
+            };
+            let [processor, wall] = [pair(&|variant| variant.processor_ms.clone()), pair(&|variant| variant.ms.clone())];
+            println!("| {pitch_deg} degrees, {way} | {} | {scales} | {dn} | {processor} | {wall} |", in_view(&plans[1], houses));
+        }
+    }
+    println!("\nrounds    of {} frames, with and without in turn; medians, of ratios too", EFFORT_HOUSES.burst);
+    Ok(())
+}
+
+/// How frame 40 is made.
+fn plan_of(variant: &mut Variant<'_>) -> Outcome<FramePlan> {
+    let mut found = None;
+    variant.session.render::<Infallible>([40], &mut |finished| {
+        found = Some(FramePlan::clone(&finished.plan));
+        Ok(())
+    })?;
+    found.ok_or_else(|| "no frame".into())
+}
+
+/// Over the picture, by all causes, 1/255 of the linear range.
+fn predicted_dn(plan: &FramePlan) -> f64 {
+    let predicted = &plan.predicted;
+    predicted.resampling_dn.hypot(predicted.blur_dn).hypot(predicted.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn))
+}
+
+fn in_view(plan: &FramePlan, variant: &Variant<'_>) -> u64 {
+    let sequence = variant.session.planner().sequence();
+    let tolerance = plan.model_tolerance(&sequence.scenario.quality);
+    ModelDetail::new(&sequence.scene, &SceneLevels::new(&sequence.scene), &plan.ideal_pose(), &tolerance).meshes
+}
+
 /// The program itself, with and without files.
 fn files(is_measuring: bool) -> Outcome<()> {
     let folder = tempfile::tempdir()?;
@@ -201,7 +276,7 @@ fn files(is_measuring: bool) -> Outcome<()> {
             let i = (place + round) % kinds.len();
             let out = folder.path().join(i.to_string());
             let run = Command::new(env!("CARGO_BIN_EXE_camsim"))
-                .args(["render".as_ref(), scenario_path().as_os_str()])
+                .args(["render".as_ref(), in_repository(ALL_EFFECTS).as_os_str()])
                 .args(kinds[i].1)
                 .args(["--frames", if is_measuring { FILE_FRAMES } else { "32" }, "--times", "-o"])
                 .arg(&out)
@@ -243,14 +318,20 @@ fn effort(effort: Effort, is_measuring: bool) -> Effort {
     if is_measuring { effort } else { Effort::TRY }
 }
 
-fn scenario_path() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("benches/all_effects.toml")
+const ALL_EFFECTS: &str = "benches/all_effects.toml";
+
+fn in_repository(path: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(path)
 }
 
 /// The scenario with some keys set.
 fn changed(sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
+    sequence_of(ALL_EFFECTS, sets)
+}
+
+fn sequence_of(path: &str, sets: &[(&str, String)]) -> Outcome<Arc<Sequence>> {
     let sets: Vec<(String, String)> = sets.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
-    Ok(load_sequence(&read_scenario(&scenario_path(), &sets, None)?)?.sequence)
+    Ok(load_sequence(&read_scenario(&in_repository(path), &sets, None)?)?.sequence)
 }
 
 fn preset() -> Outcome<Arc<Sequence>> {
