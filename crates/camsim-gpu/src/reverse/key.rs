@@ -375,6 +375,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 6056);
+        assert_eq!(PipelineKey::all().len(), 8072);
     }
 }
