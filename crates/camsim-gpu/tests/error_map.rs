@@ -8,7 +8,7 @@ use camsim_core::{
     noise::pcg4d,
     plan::{ErrorMap, FramePlan, Planner, TemporalStage},
     reference::{KeyFrame, Oracle},
-    scenario::{Auto, Channel, LensModel, LensSpec, Scenario, ShutterSpec, Solver},
+    scenario::{Auto, Axis, Channel, LensModel, LensSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
 };
@@ -98,6 +98,9 @@ fn frames_of_one_ideal_frame_have_their_own_maps() {
     (scenario.camera.size_px, scenario.camera.focal_px) = ([160, 120], [130.0, 130.0]);
     scenario.camera.lens.coefficients = vec![-0.2, 0.05, 0.001, -0.002];
     scenario.camera.mount.angles_deg = [0.0, -60.0, 0.0];
+    // So that no frame is cheap by the twist of its own instant.
+    scenario.camera.mount.vibration =
+        vec![VibrationSpec { axis: Axis::Roll, amplitude_deg: 0.05, amplitude_m: 0.0, hz: 40.0, phase_deg: 0.0 }];
     scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
     scenario.quality.frames_per_ideal = 8;
     let sequence = sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, -1.0), DVec3::new(0.1, -0.05, 0.2)), pattern(800.0));

@@ -9,7 +9,7 @@ use camsim_core::{
     plan::{FramePlan, PlanError, Planner, TemporalStage},
     pose::BodyState,
     reference::{Oracle, coord_errors},
-    scenario::{Channel, LensModel, LensSpec, MountSpec, ShutterSpec},
+    scenario::{Axis, Channel, LensModel, LensSpec, MountSpec, ShutterSpec, VibrationSpec},
     sequence::Sequence,
     trajectory::Trajectory,
 };
@@ -21,13 +21,16 @@ const ALL: [Channel; 3] = [Channel::Color, Channel::Coords, Channel::Depth];
 /// Two groups of eight.
 const FRAMES: u64 = 16;
 
+/// So much that no frame is cheap by the twist of its own instant: over so little detail one of its own would cost less than its part of a common one.
+const SHAKING: VibrationSpec = VibrationSpec { axis: Axis::Roll, amplitude_deg: 0.05, amplitude_m: 0.0, hz: 40.0, phase_deg: 0.0 };
+
 /// Over a pattern, with every effect that moves a pixel's source.
 fn flight(velocity_ned_m_s: DVec3, rate_rad_s: DVec3, frames_per_ideal: u32) -> Arc<Sequence> {
     let mut scenario = scenario();
     scenario.camera.size_px = [160, 120];
     scenario.camera.focal_px = [130.0, 130.0];
     scenario.camera.fps = 30.0;
-    scenario.camera.mount = MountSpec { angles_deg: [0.0, -60.0, 0.0], ..MountSpec::default() };
+    scenario.camera.mount = MountSpec { angles_deg: [0.0, -60.0, 0.0], vibration: vec![SHAKING], ..MountSpec::default() };
     scenario.camera.shutter = ShutterSpec { readout_ms: 20.0, exposure_ms: 6.0, ..ShutterSpec::default() };
     scenario.camera.lens = LensSpec { model: LensModel::BrownConrady, coefficients: vec![-0.2, 0.05, 0.001, -0.002] };
     scenario.quality.frames_per_ideal = frames_per_ideal;
