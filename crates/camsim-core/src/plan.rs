@@ -29,6 +29,7 @@ mod forced;
 mod frame_plan;
 mod grain;
 mod holes;
+mod kept;
 mod keys;
 mod layers;
 mod levels;
@@ -87,6 +88,8 @@ pub struct Planner {
     truth: bool,
     max_side_px: u32,
     max_ideal_px: u64,
+    /// What the probes of the last frames see around them.
+    around: kept::Kept<Vec<contours::Around>>,
     /// The last groups of frames that were looked at.
     groups: Mutex<sharing::Recent>,
     /// The last plan of a frame by itself: whoever asks whether it can be planned asks for it again.
@@ -146,6 +149,7 @@ impl Planner {
             truth,
             max_side_px,
             max_ideal_px,
+            around: kept::Kept::default(),
             groups: Mutex::default(),
             last: Mutex::default(),
         })
@@ -349,6 +353,7 @@ impl Planner {
             predicted,
             skipped,
             price: picture.price + way.price(),
+            ideal_price: picture.ideal_price,
         })
     }
 

@@ -18,6 +18,7 @@ use super::{
     surfaces::Surfaces,
 };
 use crate::{
+    camera::CameraModel,
     mount::CameraPath,
     pose::CameraPose,
     shutter::Shutter,
@@ -70,12 +71,12 @@ pub(super) struct Search<'a> {
     pub path: &'a CameraPath,
     pub shutter: &'a Shutter,
     pub stamp_s: f64,
-    pub key_pose: &'a CameraPose,
     /// Of the linear range for a pixel, for each unit of light that arrives.
     pub gain: &'a (dyn Fn([u32; 2]) -> f64 + Sync),
 }
 
-/// What is seen around a probe.
+/// What is seen around a probe, wherever the ideal frame is taken.
+#[derive(Debug)]
 pub(super) struct Around {
     contour: Option<Contour>,
     /// Side of the pixel and how far the path over the exposure goes, pixels of the camera's focal length; where there is a border.
@@ -108,11 +109,15 @@ pub(super) struct Outlook {
 }
 
 /// One probe near a silhouette.
+#[derive(Debug)]
 struct Contour {
     contrast2: f64,
     path_px: f64,
-    /// Parallax between the two surfaces, across the border.
-    strip_px: f64,
+    /// The probe's camera and ray, inverse depths on both sides of each border, and the direction across it.
+    pose: CameraPose,
+    uv: DVec2,
+    across: Vec<[f64; 2]>,
+    normal: DVec2,
 }
 
 impl Around {
@@ -129,17 +134,29 @@ impl Contour {
         self.contrast2 / f64::from(2 * NEAR_PX + 1)
     }
 
-    /// The same of the strip within parallax: narrower than a pixel it is as much less of one, and the exposure spreads it over its path.
-    fn strip(&self) -> f64 {
-        let width_px = self.strip_px * self.strip_px / (self.strip_px.max(1.0) + self.path_px);
+    /// Parallax between the two surfaces seen from an ideal frame's camera, across the border.
+    fn strip_px(&self, key_pose: &CameraPose, focal_px: DVec2) -> f64 {
+        let (rotation, shift) = self.pose.relative_to(key_pose);
+        let of_probe = rotation * self.uv.extend(1.0);
+        let key_px = |inverse_depth: f64| {
+            let in_key = of_probe + inverse_depth * shift;
+            focal_px * in_key.truncate() / in_key.z
+        };
+        self.across.iter().map(|&[a, b]| (key_px(a) - key_px(b)).dot(self.normal).abs()).fold(0.0, f64::max)
+    }
+
+    /// Squared contrast times the width of that strip: narrower than a pixel it is as much less of one, and the exposure spreads it over its path.
+    fn strip(&self, key_pose: &CameraPose, focal_px: DVec2) -> f64 {
+        let strip_px = self.strip_px(key_pose, focal_px);
+        let width_px = strip_px * strip_px / (strip_px.max(1.0) + self.path_px);
         self.contrast2 * (width_px / f64::from(2 * NEAR_PX + 1)).min(1.0)
     }
 }
 
 impl Outlook {
-    /// From what is seen around all probes, what the ideal frame's camera does not see, the mean squared error by skylines that it sees elsewhere, and the
-    /// least share that pixels at silhouettes have.
-    pub fn new(around: &[Around], holes: Holes, sky_strips: f64, least_share: f64) -> Self {
+    /// From what is seen around all probes by a camera, the ideal frame's pose, what is not seen from there, the mean squared error by skylines that are
+    /// elsewhere from there, and the least share that pixels at silhouettes have.
+    pub fn new(around: &[Around], camera: &CameraModel, key_pose: &CameraPose, holes: Holes, sky_strips: f64, least_share: f64) -> Self {
         let found = || around.iter().filter_map(|around| around.contour.as_ref());
         let near = found().count();
         let mean = |of: &dyn Fn(&Contour) -> f64| found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
@@ -156,7 +173,7 @@ impl Outlook {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
-            strips: STRIPS * contrast2 * holes.narrow_share + (share * mean(&Contour::strip)).max(sky_strips),
+            strips: STRIPS * contrast2 * holes.narrow_share + (share * mean(&|contour| contour.strip(key_pose, camera.focal_px))).max(sky_strips),
             steps: unsure * of_probes.max(finer * of_lines),
             steps_apart: of_probes.max(of_lines / finer),
             flush: unsure * finer * over_all(&|crossed| crossed.flush),
@@ -227,7 +244,6 @@ impl Search<'_> {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
-        let (rotation, shift) = pose.relative_to(self.key_pose);
         let uv = |place: DVec2| probe.uv + probe.uv_from_px * (f64::from(NEAR_PX) * place);
         let meet = |place: DVec2| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
         let places: [DVec2; 9] = std::array::from_fn(|i| DVec2::new((i % 3) as f64 - 1.0, (i / 3) as f64 - 1.0));
@@ -243,15 +259,9 @@ impl Search<'_> {
             .flat_map(|&[a, b, c]| [step(a, b), step(b, c)])
             .flatten()
             .collect();
-        let of_probe = rotation * probe.uv.extend(1.0);
-        let key_px = |inverse_depth: f64| {
-            let in_key = of_probe + inverse_depth * shift;
-            self.reach.camera.focal_px * in_key.truncate() / in_key.z
-        };
         // Across the border, towards what is nearer: along it parallax shows the same again.
         let towards = places.iter().zip(inverse_depth).fold(DVec2::ZERO, |sum, (place, nearness)| sum + nearness * *place);
         let normal = (self.reach.camera.focal_px * (probe.uv_from_px * towards)).normalize_or_zero();
-        let strip_px = |&[a, b]: &[usize; 2]| (key_px(inverse_depth[a]) - key_px(inverse_depth[b])).dot(normal).abs();
         let color = |i: usize| {
             let way = uv(places[i]).extend(1.0);
             self.surfaces.light(pose.position_ned_m, pose.ned_from_camera * way, met[i].as_ref(), way.length()).color
@@ -268,9 +278,12 @@ impl Search<'_> {
             [(focal_px.element_product() * probe.uv_from_px.determinant().abs()).sqrt(), path.0.length()]
         });
         let contour = sides_px.filter(|_| !across.is_empty()).map(|[_, path_px]| Contour {
-            strip_px: across.iter().map(strip_px).fold(0.0, f64::max),
             contrast2: (self.gain)(probe.pixel).powi(2) * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
             path_px,
+            pose,
+            uv: probe.uv,
+            across: across.iter().map(|ends| ends.map(|i| inverse_depth[i])).collect(),
+            normal,
         });
         Around { is_beside: contour.is_some() || crossed.borders > 0 || LINES.iter().any(is_fold), contour, sides_px, crossed }
     }
@@ -289,7 +302,6 @@ pub(super) mod tests {
 
     use super::*;
     use crate::{
-        camera::CameraModel,
         plan::{SurfaceReads, exposure::ExposurePath, stairs},
         pose::BodyState,
         scenario::{LensModel, MountSpec, ShutterSpec},
@@ -343,9 +355,8 @@ pub(super) mod tests {
         let reach = LensReach::new(Arc::new(camera)).unwrap();
         let (key_pose, gain) = (path.pose(0.0), |_: [u32; 2]| gain);
         let surfaces = Surfaces::new(Arc::new(scene));
-        let search =
-            Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, key_pose: &key_pose, gain: &gain };
-        Outlook::new(&search.look_around(), holes, 0.0, 0.0)
+        let search = Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, gain: &gain };
+        Outlook::new(&search.look_around(), &reach.camera, &key_pose, holes, 0.0, 0.0)
     }
 
     #[test]

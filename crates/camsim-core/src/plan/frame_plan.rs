@@ -107,6 +107,8 @@ pub struct FramePlan {
     pub skipped: Vec<Skip>,
     /// Time that it is expected to take, roughly, in bilinear reads of every output pixel: what plans are compared by.
     pub price: f64,
+    /// The part of it that this frame's share of the ideal frame takes.
+    pub ideal_price: f64,
 }
 
 impl FramePlan {

@@ -101,8 +101,9 @@ pub(super) type Beside<'a> = dyn Fn(&Sampling, Option<BlurStage>) -> Option<f64>
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub sampling: Sampling,
-    /// Bilinear reads of an output pixel.
+    /// Bilinear reads of an output pixel, and the part of them that the ideal frame takes.
     pub price: f64,
+    pub ideal_price: f64,
     /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the tolerance.
     pub total_dn: f64,
     pub within: bool,
@@ -159,7 +160,7 @@ impl Prospect<'_> {
             (sampling, sampling.tried(quality, exposure))
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
-        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share);
+        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share).iter().sum::<f64>();
         // Each with the fewest samples first: it may not be cheaper than that, and without any error.
         let fewest = |sampling: &Sampling| way(*sampling, choices(sampling.scale).first().copied().unwrap_or(0.0));
         let mut ways: Vec<(f64, Sampling)> = scales
@@ -207,8 +208,12 @@ impl Prospect<'_> {
                 }
             }
         }
-        if let Some((price, total_dn, sampling)) = cheapest {
-            return Choice { sampling, price, total_dn, within: true };
+        let choice = |sampling: Sampling, total_dn: f64, within: bool| {
+            let [ideal_price, reads] = self.cost(&sampling, sampling.tried(quality, exposure), ideal_share);
+            Choice { sampling, price: ideal_price + reads, ideal_price, total_dn, within }
+        };
+        if let Some((_, total_dn, sampling)) = cheapest {
+            return choice(sampling, total_dn, true);
         }
         // The cheapest of those that come near the best, with no more samples than that takes.
         let enough_dn = NEARLY * failed.iter().map(|(total_dn, _)| *total_dn).fold(f64::INFINITY, f64::min);
@@ -217,7 +222,7 @@ impl Prospect<'_> {
         let of = |way: (Sampling, Option<BlurStage>)| {
             let sampling = exactly(way);
             let beside_dn = beside_dn(&way.0, way.1).unwrap_or(f64::INFINITY);
-            Choice { sampling, price: cost(&way), total_dn: sampling.expected.total_dn().hypot(beside_dn), within: false }
+            choice(sampling, sampling.expected.total_dn().hypot(beside_dn), false)
         };
         let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
         let most = tried.last().copied();
@@ -229,8 +234,9 @@ impl Prospect<'_> {
         let blur = sampling.tried(task.quality, task.exposure);
         let expected = self.expected(sampling, blur);
         let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
-        let price = self.cost(sampling, blur, task.ideal_share);
-        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= task.quality.max_error_dn }
+        let [ideal_price, reads] = self.cost(sampling, blur, task.ideal_share);
+        let within = total_dn <= task.quality.max_error_dn;
+        Choice { sampling: Sampling { expected, ..*sampling }, price: ideal_price + reads, ideal_price, total_dn, within }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -256,8 +262,8 @@ impl Prospect<'_> {
         }
     }
 
-    /// Time of a way, in bilinear reads of an output pixel.
-    fn cost(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> f64 {
+    /// Time of a way, in bilinear reads of an output pixel: of the ideal frame, and of reading it.
+    fn cost(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> [f64; 2] {
         let &Sampling { scale, surface_reads, taps, .. } = sampling;
         let of = |sight: &Sight<'_>| {
             let sides = scale * sight.camera_from_px;
@@ -272,7 +278,7 @@ impl Prospect<'_> {
         };
         let reads = self.sights.iter().map(of).sum::<f64>() / self.weight();
         let [drawn, drawn_px] = if self.has_terrain { TERRAIN_COSTS } else { [0.0; 2] };
-        ideal_share * (drawn + scale * scale * (drawn_px + IDEAL_COSTS[surface_reads as usize])) + reads
+        [ideal_share * (drawn + scale * scale * (drawn_px + IDEAL_COSTS[surface_reads as usize])), reads]
     }
 }
 

@@ -150,10 +150,11 @@ impl<'a> Look<'a> {
         let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: None, nearest_depth: false };
         let truths = error::Truths::of_silhouettes(reach, trial);
         let gain = &prospect::gain(sequence, &reach.camera);
-        let around = contours::Search { reach, surfaces, path, shutter, stamp_s, key_pose, gain }.look_around();
+        let around =
+            self.planner.around.of(self.frame, || contours::Search { reach, surfaces, path, shutter, stamp_s, gain }.look_around());
         let least_share = truths.share_apart(|probe| around[probe].is_beside);
         let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
-        Some(contours::Outlook::new(&around, holes, sky_strips, least_share))
+        Some(contours::Outlook::new(&around, &reach.camera, key_pose, holes, sky_strips, least_share))
     }
 }
 

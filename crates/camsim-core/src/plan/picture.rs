@@ -20,15 +20,16 @@ pub(super) struct Picture {
     /// Whether they are left as they are, and if not, fine pixels along a side of each ideal one.
     pub is_plain: bool,
     pub fine: u32,
-    /// Time, bilinear reads of an output pixel.
+    /// Time, bilinear reads of an output pixel, and the part of it that the ideal frame takes.
     pub price: f64,
+    pub ideal_price: f64,
 }
 
 impl Look<'_> {
     /// The cheapest picture within `quality.max_error_dn`, or the best there is.
     pub fn picture(&self, scenery: &Scenery<'_>) -> Picture {
         if self.is_paper() {
-            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: 0.0 };
+            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: 0.0, ideal_price: 0.0 };
         }
         let quality = &self.planner.sequence.scenario.quality;
         let max_error_dn = quality.max_error_dn * self.asked.share_of_dn;
@@ -46,7 +47,8 @@ impl Look<'_> {
         let Some(outlook) = outlook else {
             let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
-            return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
+            let Choice { sampling, price, ideal_price, .. } = choice;
+            return Picture { sampling, silhouettes: None, is_plain: false, fine: 1, price, ideal_price };
         };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
@@ -87,7 +89,8 @@ impl Look<'_> {
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
         let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine) });
-        Picture { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price }
+        let Choice { sampling, price, ideal_price, .. } = choice;
+        Picture { sampling, silhouettes, is_plain, fine, price, ideal_price }
     }
 
     /// Scale from which on the ideal frame is too large.

@@ -30,8 +30,6 @@ const MOST_AREA: f64 = 4.0;
 const SHARES: [f64; 3] = [1.0, 1.0, 0.85];
 /// From so many frames on the halves of a group are tried each for itself.
 const FAR: u64 = 8;
-/// A group that takes less than this part of the time of single frames is not compared with its halves.
-const GOOD: f64 = 0.65;
 /// Groups that are remembered: frames are asked for in order, by a few threads.
 const REMEMBERED: usize = 4;
 
@@ -136,6 +134,7 @@ impl Planner {
 
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
     pub fn forget(&self) {
+        self.around.forget();
         self.groups.lock().unwrap_or_else(PoisonError::into_inner).0.clear();
         *self.last.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
@@ -220,8 +219,9 @@ impl Planner {
         let price =
             |plans: &[Option<FramePlan>]| -> f64 { plans.iter().map(|plan| plan.as_ref().map_or(own.price, |plan| plan.price)).sum() };
         let half = count as u64 / 2;
-        let is_good = whole.as_ref().is_some_and(|whole| price(whole) < GOOD * own.price * count as f64);
-        if is_good || half < 2 {
+        // Halves are sampled no more coarsely than a frame by itself is, and save as much of its ideal frame as so many can.
+        let least_of_halves = count as f64 * (own.price - own.ideal_price * (1.0 - 1.0 / half.max(1) as f64));
+        if half < 2 || whole.as_ref().is_some_and(|whole| price(whole) <= least_of_halves) {
             return whole.unwrap_or_else(|| vec![None; count]);
         }
         let middle = frames.start + half;
