@@ -20,6 +20,7 @@ use crate::{
 mod borders;
 mod bounds;
 mod contours;
+mod costs;
 mod describe;
 mod dry_run;
 mod edges;
@@ -352,8 +353,8 @@ impl Planner {
             terrain_error_px,
             predicted,
             skipped,
-            price: picture.price + way.price(),
-            ideal_price: picture.ideal_price,
+            price_ms: picture.price.ms + way.ms(),
+            ideal_price_ms: picture.price.ideal_ms,
         })
     }
 

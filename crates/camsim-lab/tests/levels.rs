@@ -75,7 +75,7 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             if !(BELOW..ABOVE).contains(&ratio) || predicted.levels_kept && measured_dn > ABOVE * max_error_dn {
                 outside.push(format!("{} at {max_error_dn}: {measured_dn:.3} for {predicted_dn:.3}", case.name));
             }
-            costs.push(plan.price);
+            costs.push(plan.price_ms);
         }
         // What leaves less error may cost a fifth more, and the solver has a price of its own.
         assert!(costs.windows(2).all(|pair| pair[0] < DEARER * pair[1]), "{}: a wider tolerance must not cost more: {costs:?}", case.name);
@@ -138,7 +138,7 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         let ratio = rays_dn / with_rays.predicted.picture_dn();
         assert!(with_rays.edges.has_rays() && with_rays.predicted.levels_kept, "{:?}", with_rays.predicted);
         assert!((BELOW..ABOVE).contains(&ratio), "{}: {rays_dn:.3} with rays, {ratio:.2} of the prediction", case.name);
-        assert!(plan.price < with_rays.price, "dearer than rays: {} {}", plan.price, with_rays.price);
+        assert!(plan.price_ms < with_rays.price_ms, "dearer than rays: {} {}", plan.price_ms, with_rays.price_ms);
         // Too little for the stairs even of the finest ideal frame.
         let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0));
         assert!(

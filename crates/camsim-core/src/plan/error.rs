@@ -104,25 +104,24 @@ pub(super) struct Way {
     pub blur: Option<BlurStage>,
 }
 
-/// Prices of a camera of its own for each line, and of a look-up of depth: bilinear reads of an output pixel, from what `camsim bench` measures
-/// for a turn about the optical axis with each of the solvers.
-const POSE_PRICE: f64 = 3.0;
-const LOOK_UP_PRICE: f64 = 2.5;
+/// Of a camera of its own for each line, and of a look-up of depth, milliseconds as in `costs.rs`: from its reverse passes, less their reads.
+const POSE_MS: f64 = 0.8;
+const LOOK_UP_MS: f64 = 1.2;
 
 impl Way {
-    /// Beside what the reads themselves take, bilinear reads of an output pixel.
-    pub fn price(self) -> f64 {
+    /// Beside what the reads themselves take, milliseconds.
+    pub fn ms(self) -> f64 {
         let nodes = self.blur.map_or(1, |blur| blur.solved());
         let looks = match self.blur.map(|blur| blur.depths) {
             None | Some(NodeDepths::Mid) => 1,
             Some(NodeDepths::Ends) => 2,
             Some(NodeDepths::Each) => nodes,
         };
-        let poses = f64::from(nodes) * POSE_PRICE;
+        let poses = f64::from(nodes) * POSE_MS;
         match self.temporal {
             TemporalStage::Identity => 0.0,
             TemporalStage::Rotation | TemporalStage::Linear | TemporalStage::Rk2 => poses,
-            TemporalStage::Reproject { iterations } => poses + f64::from(iterations * looks) * LOOK_UP_PRICE,
+            TemporalStage::Reproject { iterations } => poses + f64::from(iterations * looks) * LOOK_UP_MS,
         }
     }
 }

@@ -105,10 +105,11 @@ pub struct FramePlan {
     pub predicted: Predicted,
     /// What is not done.
     pub skipped: Vec<Skip>,
-    /// Time that it is expected to take, roughly, in bilinear reads of every output pixel: what plans are compared by.
-    pub price: f64,
-    /// The part of it that this frame's share of the ideal frame takes.
-    pub ideal_price: f64,
+    /// Time that its passes are expected to take, roughly, and the part of it that this frame's share of the ideal frame takes: milliseconds for pictures
+    /// of 640x480 on two processor cores with llvmpipe, whatever machine this is. What plans are compared by.
+    pub price_ms: f64,
+    /// See above.
+    pub ideal_price_ms: f64,
 }
 
 impl FramePlan {

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     BlurStage, FramePlan, SurfaceReads,
+    costs::Price,
     exposure::ExposurePath,
     picture::Picture,
     prospect::{Prospect, Sight},
@@ -43,15 +44,6 @@ const MAX_SAMPLES: u32 = 512;
 const MOST_TAPS: u32 = 4;
 /// Those that are tried.
 const CAPS: [u32; 3] = [2, 3, MOST_TAPS];
-/// Costs beside one bilinear read of an output pixel: an ideal pixel by [`SurfaceReads`], a read of the spline of a sharp picture, and of one
-/// with an exposure, where the whole path is laid out for it first. From frame times on llvmpipe with 2 to 16 samples and ideal frames of
-/// 1 to 4 times the pixels, one such read 2.4 ms at 640x480.
-const IDEAL_COSTS: [f64; 4] = [3.0, 4.3, 5.6, 8.0];
-/// Of terrain's triangles: for an ideal frame of one pixel for each of the camera's, and for each ideal pixel, since a finer frame shows more of
-/// them. From the ideal pass of benches/all_effects.toml at scales of 1, 1.41 and 2: 120, 168 and 349 ms.
-const TERRAIN_COSTS: [f64; 2] = [7.5, 4.0];
-const SPLINE_COST: f64 = 5.0;
-const BLUR_SPLINE_COSTS: [f64; 2] = [8.0, 3.4];
 /// Where no way keeps a tolerance: times the least error there is.
 pub(super) const NEARLY: f64 = 1.15;
 /// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.
@@ -101,9 +93,7 @@ pub(super) type Beside<'a> = dyn Fn(&Sampling, Option<BlurStage>) -> Option<f64>
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Choice {
     pub sampling: Sampling,
-    /// Bilinear reads of an output pixel, and the part of them that the ideal frame takes.
-    pub price: f64,
-    pub ideal_price: f64,
+    pub price: Price,
     /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the tolerance.
     pub total_dn: f64,
     pub within: bool,
@@ -140,7 +130,7 @@ impl Prospect<'_> {
     }
 
     /// Of all places.
-    fn weight(&self) -> f64 {
+    pub(super) fn weight(&self) -> f64 {
         self.sights.iter().map(|sight| sight.weight).sum::<f64>().max(1e-9)
     }
 
@@ -160,15 +150,17 @@ impl Prospect<'_> {
             (sampling, sampling.tried(quality, exposure))
         };
         let choices = |scale: f64| if exposure.is_some() { per_px(scale) } else { vec![0.0] };
-        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.cost(sampling, *blur, ideal_share).iter().sum::<f64>();
+        let cost = |(sampling, blur): &(Sampling, Option<BlurStage>)| self.price(sampling, *blur, ideal_share).ms;
         // Each with the fewest samples first: it may not be cheaper than that, and without any error.
-        let fewest = |sampling: &Sampling| way(*sampling, choices(sampling.scale).first().copied().unwrap_or(0.0));
-        let mut ways: Vec<(f64, Sampling)> = scales
-            .iter()
-            .flat_map(|&scale| self.stages(quality, scale).into_iter().map(move |taps| (scale, taps)))
-            .flat_map(|(scale, taps)| SurfaceReads::ALL.map(|reads| Sampling::new(scale, reads, taps)))
-            .map(|sampling| (cost(&fewest(&sampling)), sampling))
-            .collect();
+        let fewest = |sampling: Sampling| way(sampling, choices(sampling.scale).first().copied().unwrap_or(0.0)).1;
+        let mut ways: Vec<(f64, Sampling)> = Vec::new();
+        for &scale in &scales {
+            let of_ideal = SurfaceReads::ALL.map(|reads| (reads, self.ideal_ms(scale, reads, ideal_share)));
+            for taps in self.stages(quality, scale) {
+                let read_ms = self.read_ms(scale, taps, fewest(Sampling::new(scale, SurfaceReads::One, taps)));
+                ways.extend(of_ideal.map(|(reads, ideal_ms)| (ideal_ms + read_ms, Sampling::new(scale, reads, taps))));
+            }
+        }
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let price = |cost: f64, total_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / max_error_dn));
         // A few places tell what is far from keeping the tolerance.
@@ -209,8 +201,8 @@ impl Prospect<'_> {
             }
         }
         let choice = |sampling: Sampling, total_dn: f64, within: bool| {
-            let [ideal_price, reads] = self.cost(&sampling, sampling.tried(quality, exposure), ideal_share);
-            Choice { sampling, price: ideal_price + reads, ideal_price, total_dn, within }
+            let price = self.price(&sampling, sampling.tried(quality, exposure), ideal_share);
+            Choice { sampling, price, total_dn, within }
         };
         if let Some((_, total_dn, sampling)) = cheapest {
             return choice(sampling, total_dn, true);
@@ -234,9 +226,8 @@ impl Prospect<'_> {
         let blur = sampling.tried(task.quality, task.exposure);
         let expected = self.expected(sampling, blur);
         let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
-        let [ideal_price, reads] = self.cost(sampling, blur, task.ideal_share);
-        let within = total_dn <= task.quality.max_error_dn;
-        Choice { sampling: Sampling { expected, ..*sampling }, price: ideal_price + reads, ideal_price, total_dn, within }
+        let price = self.price(sampling, blur, task.ideal_share);
+        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= task.quality.max_error_dn }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -260,25 +251,6 @@ impl Prospect<'_> {
                 stages
             }
         }
-    }
-
-    /// Time of a way, in bilinear reads of an output pixel: of the ideal frame, and of reading it.
-    fn cost(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> [f64; 2] {
-        let &Sampling { scale, surface_reads, taps, .. } = sampling;
-        let of = |sight: &Sight<'_>| {
-            let sides = scale * sight.camera_from_px;
-            let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let cost = match blur.map(|blur| f64::from(sample_count(&blur, scale * sight.path_px, &area))) {
-                None if area.spline.is_some() => SPLINE_COST,
-                None => f64::from(area.taps[0] * area.taps[1]),
-                Some(samples) if area.spline.is_some() => BLUR_SPLINE_COSTS[0] + BLUR_SPLINE_COSTS[1] * samples,
-                Some(samples) => samples,
-            };
-            sight.weight * cost
-        };
-        let reads = self.sights.iter().map(of).sum::<f64>() / self.weight();
-        let [drawn, drawn_px] = if self.has_terrain { TERRAIN_COSTS } else { [0.0; 2] };
-        [ideal_share * (drawn + scale * scale * (drawn_px + IDEAL_COSTS[surface_reads as usize])), reads]
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::{
     contours::{Contours, Outlook},
+    costs::Price,
     edges,
     levels::{Choice, FINEST_SCALE, MOST_SCALE, NEARLY, Sampling, Task},
     look::{Look, Scenery},
@@ -20,16 +21,14 @@ pub(super) struct Picture {
     /// Whether they are left as they are, and if not, fine pixels along a side of each ideal one.
     pub is_plain: bool,
     pub fine: u32,
-    /// Time, bilinear reads of an output pixel, and the part of it that the ideal frame takes.
-    pub price: f64,
-    pub ideal_price: f64,
+    pub price: Price,
 }
 
 impl Look<'_> {
     /// The cheapest picture within `quality.max_error_dn`, or the best there is.
     pub fn picture(&self, scenery: &Scenery<'_>) -> Picture {
         if self.is_paper() {
-            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: 0.0, ideal_price: 0.0 };
+            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: Price::default() };
         }
         let quality = &self.planner.sequence.scenario.quality;
         let max_error_dn = quality.max_error_dn * self.asked.share_of_dn;
@@ -47,8 +46,7 @@ impl Look<'_> {
         let Some(outlook) = outlook else {
             let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
-            let Choice { sampling, price, ideal_price, .. } = choice;
-            return Picture { sampling, silhouettes: None, is_plain: false, fine: 1, price, ideal_price };
+            return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
         };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
@@ -71,14 +69,14 @@ impl Look<'_> {
             Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
-                if plain.within && plain.price < outlook.price_of_rays(task.least_scale, 1) {
+                if plain.within && plain.price.ms < outlook.rays_ms(1) {
                     (plain, true, 1)
                 } else {
                     let (with_rays, fine) = with_rays();
                     // Where nothing keeps the tolerance silhouettes may take all of it.
                     let plain = if plain.within || with_rays.within { plain } else { plain_if(&|_| true) };
                     let is_as_good = if with_rays.within { plain.within } else { plain.total_dn <= NEARLY * with_rays.total_dn };
-                    let is_plain = plain.within && !with_rays.within || is_as_good && plain.price < with_rays.price;
+                    let is_plain = plain.within && !with_rays.within || is_as_good && plain.price.ms < with_rays.price.ms;
                     (if is_plain { plain } else { with_rays }, is_plain, fine)
                 }
             }
@@ -89,8 +87,7 @@ impl Look<'_> {
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
         let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine) });
-        let Choice { sampling, price, ideal_price, .. } = choice;
-        Picture { sampling, silhouettes, is_plain, fine, price, ideal_price }
+        Picture { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price }
     }
 
     /// Scale from which on the ideal frame is too large.
@@ -121,7 +118,8 @@ fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers
         let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
         let choice = prospect
             .choose(task, &|sampling, blur| may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine).error_dn.hypot(layers_dn)));
-        (Choice { price: choice.price + outlook.price_of_rays(choice.sampling.scale, fine), ..choice }, fine)
+        let price = Price { ms: choice.price.ms + outlook.rays_ms(fine), ..choice.price };
+        (Choice { price, ..choice }, fine)
     };
     let mut failed = Vec::new();
     for fine in 1..=edges::MOST_FINE {

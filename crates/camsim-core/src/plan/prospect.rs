@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     LensReach,
+    costs::Drawn,
     grain::{SceneGrain, Spectrum},
     probes::Probe,
     resample::Parts,
@@ -47,7 +48,9 @@ pub(super) struct Prospect<'a> {
     pub principal_px: DVec2,
     /// Narrowest and widest output pixel, camera px.
     pub widths: [f64; 2],
-    pub has_terrain: bool,
+    /// Whether the lens bends rows, and what the scene takes to draw.
+    pub is_bent: bool,
+    pub drawn: Drawn,
 }
 
 impl<'a> Prospect<'a> {
@@ -98,8 +101,8 @@ impl<'a> Prospect<'a> {
             sides.x_axis.length().max(sides.y_axis.length())
         };
         let widths = probes.iter().map(width).fold([f64::INFINITY, 0.0], |[least, most], width| [width.min(least), width.max(most)]);
-        let has_terrain = sequence.scene.terrain.is_some();
-        Self { sights: few_of(sights), has_terrain, counted, principal_px: reach.camera.principal_point_px, widths }
+        let (is_bent, drawn) = (!reach.camera.lens.is_identity(), Drawn::new(&sequence.scene));
+        Self { sights: few_of(sights), is_bent, drawn, counted, principal_px: reach.camera.principal_point_px, widths }
     }
 }
 

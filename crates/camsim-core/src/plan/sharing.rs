@@ -217,10 +217,10 @@ impl Planner {
         let count = (frames.end - frames.start) as usize;
         let whole: Option<Vec<_>> = self.shared(frames.clone(), own).map(|plans| plans.into_iter().map(Some).collect());
         let price =
-            |plans: &[Option<FramePlan>]| -> f64 { plans.iter().map(|plan| plan.as_ref().map_or(own.price, |plan| plan.price)).sum() };
+            |plans: &[Option<FramePlan>]| -> f64 { plans.iter().map(|plan| plan.as_ref().map_or(own.price_ms, |plan| plan.price_ms)).sum() };
         let half = count as u64 / 2;
         // Halves are sampled no more coarsely than a frame by itself is, and save as much of its ideal frame as so many can.
-        let least_of_halves = count as f64 * (own.price - own.ideal_price * (1.0 - 1.0 / half.max(1) as f64));
+        let least_of_halves = count as f64 * (own.price_ms - own.ideal_price_ms * (1.0 - 1.0 / half.max(1) as f64));
         if half < 2 || whole.as_ref().is_some_and(|whole| price(whole) <= least_of_halves) {
             return whole.unwrap_or_else(|| vec![None; count]);
         }
@@ -236,12 +236,12 @@ impl Planner {
     fn shared(&self, frames: Range<u64>, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let common = self.common(frames.clone(), own)?;
         let candidates = Candidates::new(self, &common);
-        let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price * count as f64;
+        let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price_ms * count as f64;
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
             let plan = candidates.plan(coarsest, Asked { share_of_dn, given: None });
-            let plan = plan.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price, 1))?;
+            let plan = plan.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
             if !keeps_dn(&plan, own) {
                 return None;
             }
@@ -252,7 +252,7 @@ impl Planner {
                 .max_by(|a, b| a.predicted.picture_dn().total_cmp(&b.predicted.picture_dn()));
             match too_coarse {
                 Some(plan) => coarsest = plan.frame,
-                None => return is_worth_it(plans.iter().map(|plan| plan.price).sum(), common.count()).then(|| together(plans)),
+                None => return is_worth_it(plans.iter().map(|plan| plan.price_ms).sum(), common.count()).then(|| together(plans)),
             }
         }
         None

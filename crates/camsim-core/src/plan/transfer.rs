@@ -158,6 +158,16 @@ impl SurfaceFilter {
         (self.level, self.sides)
     }
 
+    /// How many reads there are.
+    pub fn taps(&self) -> u32 {
+        self.taps[0] * self.taps[1]
+    }
+
+    /// Whether each of them is of two versions of the picture.
+    pub fn is_of_two(&self) -> bool {
+        self.level > 0.0
+    }
+
     /// What is left of a wave beyond what the texture itself has.
     fn leaves(&self, cycles: DVec2) -> f64 {
         let grid: f64 = (0..2).map(|k| evenly(self.taps[k], self.sides[k].dot(cycles))).product();

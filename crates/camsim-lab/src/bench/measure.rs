@@ -51,7 +51,7 @@ impl Work {
 
 /// What the renderer does for a plan: every field, so that one added later counts, but those that are only told to the user.
 fn text(plan: FramePlan) -> String {
-    format!("{:?}", FramePlan { predicted: Predicted::default(), skipped: Vec::new(), price: 0.0, ideal_price: 0.0, ..plan })
+    format!("{:?}", FramePlan { predicted: Predicted::default(), skipped: Vec::new(), price_ms: 0.0, ideal_price_ms: 0.0, ..plan })
 }
 
 /// For each variant the first one with the same plans: itself, or one above it. The renderer knows of `quality` only what is in the plans.

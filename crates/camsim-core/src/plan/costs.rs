@@ -1,0 +1,134 @@
+//! What ways of sampling cost: milliseconds that a frame of 640x480 takes, by the clock, on two processor cores with llvmpipe. Other machines have other
+//! times; plans are compared by their ratios.
+//!
+//! From the times of the ideal and the reverse pass of nine cases of `camsim bench`, `benches/all_effects.toml` and `benches/houses.toml`, each with ideal
+//! frames of 1 to 2.83 times the camera's scale, all ways of reading surfaces and the ideal frame, and 2 to 40 samples of the exposure
+//! (docs/PERFORMANCE.md, "What the plan takes things to cost").
+
+use glam::DMat2;
+
+use super::{
+    BlurStage, SurfaceReads,
+    levels::{Sampling, sample_count},
+    prospect::{Prospect, Sight},
+    transfer::SurfaceFilter,
+};
+use crate::{
+    scene::Scene,
+    temporal::{Footprint, TapStage},
+};
+
+/// Of an ideal pixel for each of the camera's: what any takes, each read of a surface's picture, what it takes more to read two of its smaller
+/// versions, and to find out how many reads there are.
+const IDEAL_MS: f64 = 3.0;
+const SURFACE_READ_MS: f64 = 1.2;
+const TWO_VERSIONS_MS: f64 = 1.4;
+const ANY_READS_MS: f64 = 1.8;
+/// Of drawing a thousand triangles; and at most, for ideal frames of the camera's scale and for each time that: their level of detail and what is in
+/// view leave no more. Of the terrain, and of models.
+const TRIANGLES_MS: f64 = 0.17;
+const TERRAIN_MS: [f64; 2] = [3.0, 9.0];
+const MODELS_MS: [f64; 2] = [25.0, 13.0];
+/// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
+const READ_MS: f64 = 1.0;
+const SPLINE_MS: f64 = 6.5;
+const GRID_MS: [f64; 2] = [5.0, 1.5];
+const EITHER_MS: [f64; 2] = [11.0, 1.4];
+/// Of reading it over an exposure, and for each sample: the kernel that knows splines and grids takes the time of both.
+const SPLINE_SAMPLES_MS: [f64; 2] = [5.0, 4.4];
+const GRID_SAMPLES_MS: [f64; 2] = [1.0, 1.5];
+const EITHER_SAMPLES_MS: [f64; 2] = [6.0, 6.7];
+/// Of a pixel whatever it reads, and for each time that the ideal frame is finer, since fewer reads then find a pixel that is at hand already; and both
+/// where a lens bends rows.
+const ANY_MS: [f64; 2] = [3.5, 0.6];
+const BENT_MS: [f64; 2] = [7.0, 4.0];
+
+/// What the triangles of a scene take to draw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drawn {
+    terrain_ms: f64,
+    models_ms: f64,
+}
+
+impl Drawn {
+    /// Of all triangles that there are.
+    pub fn new(scene: &Scene) -> Self {
+        let ms = |triangles: usize| 1e-3 * TRIANGLES_MS * triangles as f64;
+        let of_terrain = scene.terrain.as_ref().map_or(0, |terrain| {
+            terrain.chunks.iter().map(|chunk| 2 * chunk.cells[0] as usize * chunk.cells[1] as usize).sum()
+        });
+        Self { terrain_ms: ms(of_terrain), models_ms: ms(scene.meshes.iter().map(|mesh| mesh.shape.indices.len() / 3).sum()) }
+    }
+
+    fn ms(self, scale: f64) -> f64 {
+        let at_most = |[least, times]: [f64; 2]| least + times * scale;
+        self.terrain_ms.min(at_most(TERRAIN_MS)) + self.models_ms.min(at_most(MODELS_MS))
+    }
+}
+
+/// The whole price of a way, and the part of it that the ideal frame takes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Price {
+    pub ms: f64,
+    pub ideal_ms: f64,
+}
+
+impl Prospect<'_> {
+    /// Of a way, with so many pixels drawn of the ideal frame at scale 1 for each of the camera's.
+    pub fn price(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> Price {
+        let ideal_ms = self.ideal_ms(sampling.scale, sampling.surface_reads, ideal_share);
+        Price { ms: ideal_ms + self.read_ms(sampling.scale, sampling.taps, blur), ideal_ms }
+    }
+
+    /// Of the ideal frame.
+    pub fn ideal_ms(&self, scale: f64, reads: SurfaceReads, ideal_share: f64) -> f64 {
+        let a_px = self.mean(|sight| surface_ms(sight.texel_from_key * scale.recip(), reads));
+        ideal_share * (self.drawn.ms(scale) + scale * scale * a_px)
+    }
+
+    /// Of reading it.
+    pub fn read_ms(&self, scale: f64, taps: TapStage, blur: Option<BlurStage>) -> f64 {
+        let [any_ms, finer_ms] = if self.is_bent { BENT_MS } else { ANY_MS };
+        let of = |sight: &Sight<'_>| {
+            let sides = scale * sight.camera_from_px;
+            let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
+            let samples = blur.map(|blur| sample_count(&blur, scale * sight.path_px, &area));
+            footprint_ms(taps, &area, samples)
+        };
+        any_ms + finer_ms * (scale - 1.0) + self.mean(of)
+    }
+
+    /// Over the places.
+    fn mean(&self, of: impl Fn(&Sight<'_>) -> f64) -> f64 {
+        self.sights.iter().map(|sight| sight.weight * of(sight)).sum::<f64>() / self.weight()
+    }
+}
+
+/// Of an ideal pixel that shows a surface.
+fn surface_ms(texel_from_ideal: DMat2, reads: SurfaceReads) -> f64 {
+    let filter = SurfaceFilter::new(texel_from_ideal, reads);
+    let (count, is_of_two) = (f64::from(filter.taps()), filter.is_of_two());
+    let (times, two_ms) = if is_of_two { (2.0, TWO_VERSIONS_MS) } else { (1.0, 0.0) };
+    let any_ms = if reads == SurfaceReads::Grid { ANY_READS_MS } else { 0.0 };
+    IDEAL_MS + SURFACE_READ_MS * count * times + two_ms + any_ms
+}
+
+/// Of a pixel that reads the ideal frame, with so many samples of an exposure.
+fn footprint_ms(stage: TapStage, area: &Footprint, samples: Option<u32>) -> f64 {
+    let reads = f64::from(area.taps[0] * area.taps[1]);
+    let Some(samples) = samples.map(f64::from) else {
+        return match stage {
+            TapStage::Bilinear => READ_MS,
+            TapStage::Spline => SPLINE_MS,
+            TapStage::Grid { .. } => GRID_MS[0] + GRID_MS[1] * (reads - 1.0),
+            TapStage::SplineOrGrid { .. } => EITHER_MS[0] + EITHER_MS[1] * if area.spline.is_some() { 0.0 } else { reads },
+        };
+    };
+    let of = |[whole, each]: [f64; 2]| whole + each * samples;
+    match stage {
+        TapStage::Bilinear => READ_MS * samples,
+        TapStage::Spline => of(SPLINE_SAMPLES_MS),
+        TapStage::Grid { .. } => of(GRID_SAMPLES_MS),
+        TapStage::SplineOrGrid { .. } => of(EITHER_SAMPLES_MS),
+    }
+}
