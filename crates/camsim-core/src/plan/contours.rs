@@ -173,7 +173,8 @@ impl Outlook {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
-            strips: STRIPS * contrast2 * holes.narrow_share + (share * mean(&|contour| contour.strip(key_pose, camera.focal_px))).max(sky_strips),
+            strips: STRIPS * contrast2 * holes.narrow_share
+                + (share * mean(&|contour| contour.strip(key_pose, camera.focal_px))).max(sky_strips),
             steps: unsure * of_probes.max(finer * of_lines),
             steps_apart: of_probes.max(of_lines / finer),
             flush: unsure * finer * over_all(&|crossed| crossed.flush),

@@ -54,9 +54,10 @@ impl Drawn {
     /// Of all triangles that there are.
     pub fn new(scene: &Scene) -> Self {
         let ms = |triangles: usize| 1e-3 * TRIANGLES_MS * triangles as f64;
-        let of_terrain = scene.terrain.as_ref().map_or(0, |terrain| {
-            terrain.chunks.iter().map(|chunk| 2 * chunk.cells[0] as usize * chunk.cells[1] as usize).sum()
-        });
+        let of_terrain = scene
+            .terrain
+            .as_ref()
+            .map_or(0, |terrain| terrain.chunks.iter().map(|chunk| 2 * chunk.cells[0] as usize * chunk.cells[1] as usize).sum());
         Self { terrain_ms: ms(of_terrain), models_ms: ms(scene.meshes.iter().map(|mesh| mesh.shape.indices.len() / 3).sum()) }
     }
 

@@ -24,6 +24,8 @@ use crate::{
 /// One place in so many is asked first, and so far above the tolerance these then settle it.
 const FEW: usize = 4;
 const FAR: f64 = 1.7;
+/// Places that one thread asks at a time: fewer are not worth another.
+const AT_ONCE: usize = 8;
 /// Times what is expected: textures are not equally grainy everywhere.
 const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
@@ -123,7 +125,7 @@ impl Prospect<'_> {
             [sight.weight, weight * error[0], weight * error[1]]
         };
         // Summed in their order: a plan does not depend on how threads share work.
-        let squares: Vec<[f64; 3]> = self.sights.par_iter().step_by(every).map(of).collect();
+        let squares: Vec<[f64; 3]> = self.sights.par_iter().step_by(every).with_min_len(AT_ONCE).map(of).collect();
         let [weight, exact, sampled] = squares.iter().fold([0.0; 3], |sum, square| [0, 1, 2].map(|k: usize| sum[k] + square[k]));
         let part = weight / self.weight();
         [exact, sampled].map(|sum| sum / (part * self.counted as f64).max(1.0))

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::{
     FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
     bounds::View,
-    levels::{FINEST_SCALE, Sampling},
+    levels::{FINEST_SCALE, NEARLY, Sampling},
     look::{Look, Scenery},
 };
 use crate::scenario::{Auto, Preset, Silhouettes};
@@ -216,8 +216,9 @@ impl Planner {
     fn share(&self, frames: Range<u64>, own: &FramePlan) -> Vec<Option<FramePlan>> {
         let count = (frames.end - frames.start) as usize;
         let whole: Option<Vec<_>> = self.shared(frames.clone(), own).map(|plans| plans.into_iter().map(Some).collect());
-        let price =
-            |plans: &[Option<FramePlan>]| -> f64 { plans.iter().map(|plan| plan.as_ref().map_or(own.price_ms, |plan| plan.price_ms)).sum() };
+        let price = |plans: &[Option<FramePlan>]| -> f64 {
+            plans.iter().map(|plan| plan.as_ref().map_or(own.price_ms, |plan| plan.price_ms)).sum()
+        };
         let half = count as u64 / 2;
         // Halves are sampled no more coarsely than a frame by itself is, and save as much of its ideal frame as so many can.
         let least_of_halves = count as f64 * (own.price_ms - own.ideal_price_ms * (1.0 - 1.0 / half.max(1) as f64));
@@ -278,7 +279,7 @@ impl Planner {
 /// Whether a frame from a common ideal frame keeps `quality.max_error_px`, or comes as near as one from its own does.
 fn keeps_px(plan: &FramePlan, own: &FramePlan) -> bool {
     let (here, there) = (&plan.predicted, &own.predicted);
-    !plan.edges.has_rays() && (here.kept || !there.kept && here.total_px <= there.total_px)
+    !plan.edges.has_rays() && (here.kept || !there.kept && here.total_px <= NEARLY * there.total_px)
 }
 
 /// The same of `quality.max_error_dn`.

@@ -19,7 +19,7 @@ use super::{
     SurfaceReads,
     grain::{Spectrum, mean_of},
 };
-use crate::temporal::Footprint;
+use crate::{scenario::MAX_FOOTPRINT_TAPS, temporal::Footprint};
 
 /// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
 const LOWEST: f64 = 0.062_5;
@@ -30,6 +30,8 @@ const DIRECTIONS: u32 = 6;
 const MOST_CYCLES: f64 = 1.5;
 /// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of the wave.
 const UNSEEN: f64 = 1e-3;
+/// Taps along a side that the plan asks for by itself, at most.
+const FEW_TAPS: u32 = 4;
 /// As in shaders/ideal/surface.wgsl and shaders/ideal/reads.
 const CLOSE_TEXELS: f64 = 0.8;
 const CELL_VARIANCE: f64 = 1.5;
@@ -203,14 +205,45 @@ fn sampled(area: &Footprint, path: Path, f: DVec2) -> Wave {
     if taps == 1 || samples > 8 * taps {
         return Wave::new(grid(area, f) * evenly(samples, cycles), 0.0);
     }
-    let step = f64::from(taps) / f64::from(samples);
-    let of_tap = |tap: u32| {
-        let count = (samples - tap).div_ceil(taps);
-        let middle = (f64::from(tap) + 0.5) / f64::from(samples) - 0.5 + 0.5 * step * f64::from(count - 1);
-        let turns = area.offset_px(tap).dot(f) + middle * cycles;
-        f64::from(count) * mean_of(count, step * cycles) * turned_by(turns)
+    if area.taps.iter().all(|&side| side <= FEW_TAPS) {
+        in_turns::<{ FEW_TAPS as usize }>(area, samples, cycles, f)
+    } else {
+        in_turns::<{ MAX_FOOTPRINT_TAPS as usize }>(area, samples, cycles, f)
+    }
+}
+
+/// A wave that is then turned by a step.
+fn after(wave: &mut Wave, step: Wave) -> Wave {
+    let next = wave.rotate(step);
+    std::mem::replace(wave, next)
+}
+
+/// The same with at most `SIDE` taps along each side: of each tap its samples' mean, turned by where the middle of them is on the path and by where the tap is
+/// in the grid. From tap to tap both turn by as much again.
+fn in_turns<const SIDE: usize>(area: &Footprint, samples: u32, cycles: f64, f: DVec2) -> Wave {
+    let line = |side: DVec2, taps: u32| -> [Wave; SIDE] {
+        let turns = side.dot(f) / f64::from(taps);
+        let (mut at, step) = (turned_by(0.5 * turns * (1.0 - f64::from(taps))), turned_by(turns));
+        std::array::from_fn(|_| after(&mut at, step))
     };
-    (0..taps.min(samples)).map(of_tap).sum::<Wave>() / f64::from(samples)
+    let (columns, rows) = (line(area.dx, area.taps[0]), line(area.dy, area.taps[1]));
+    let taps = area.taps[0] * area.taps[1];
+    let (step, a_sample) = (f64::from(taps) / f64::from(samples), cycles / f64::from(samples));
+    let to_next = turned_by(a_sample);
+    // The first taps have one sample more than the others.
+    let most = samples.div_ceil(taps);
+    let with_most = samples - (most - 1) * taps;
+    let of_taps = |first: u32, end: u32, count: u32| {
+        let middle = 0.5 - 0.5 * f64::from(samples) + f64::from(first) + 0.5 * f64::from(taps) * f64::from(count - 1);
+        let mut on_path = f64::from(count) * mean_of(count, step * cycles) * turned_by(middle * a_sample);
+        let of_tap = |tap: u32| {
+            let [column, row] = area.cell(tap).map(|k| k as usize);
+            after(&mut on_path, to_next).rotate(columns[column].rotate(rows[row]))
+        };
+        (first..end).map(of_tap).sum::<Wave>()
+    };
+    let of_others = if most > 1 { of_taps(with_most, taps, most - 1) } else { Wave::ZERO };
+    (of_taps(0, with_most, most) + of_others) / f64::from(samples)
 }
 
 /// The grid of taps.
@@ -329,6 +362,27 @@ mod tests {
             (area.tap_color(&ColorImage { size_px, rgba: &rgba }, px, 0).x - exact * wave(px, phase)).powi(2)
         });
         squares.sum::<f64>() / f64::from(turns)
+    }
+
+    #[test]
+    fn samples_in_turns_are_the_sum_of_them_all() {
+        for (taps, samples) in
+            [([4, 4], 7), ([4, 4], 16), ([4, 4], 41), ([3, 2], 5), ([2, 4], 64), ([7, 3], 30), ([1, 5], 3), ([64, 64], 9000)]
+        {
+            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, spline: None };
+            let along = DVec2::new(5.3, -2.1);
+            for f in [DVec2::new(0.11, 0.05), DVec2::new(-0.7, 0.3), DVec2::new(1.4, 0.9)] {
+                let wave = |k: u32| {
+                    let share = (f64::from(k) + 0.5) / f64::from(samples) - 0.5;
+                    DVec2::from_angle(2.0 * PI * (area.offset_px(k) + share * along).dot(f))
+                };
+                let all = (0..samples).map(wave).sum::<DVec2>() / f64::from(samples);
+                let found = sampled(&area, Path { along, samples }, f);
+                // The short sine is off by 3e-11, and the same way in every turn.
+                let bound = 1e-10 * f64::from(1 + taps[0] * taps[1]);
+                assert!(found.distance(all) < bound, "{taps:?} {samples} {f}: {found} {all}");
+            }
+        }
     }
 
     #[test]

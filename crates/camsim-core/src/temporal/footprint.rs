@@ -66,11 +66,17 @@ impl Footprint {
     /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
     #[must_use]
     pub fn offset_px(&self, i: u32) -> DVec2 {
+        let ([nx, ny], [x, y]) = (self.taps, self.cell(i));
+        let fx = (f64::from(x) + 0.5) / f64::from(nx) - 0.5;
+        let fy = (f64::from(y) + 0.5) / f64::from(ny) - 0.5;
+        self.dx * fx + self.dy * fy
+    }
+
+    /// Column and row of tap `i` (cyclic) in the grid.
+    pub(crate) fn cell(&self, i: u32) -> [u32; 2] {
         let [nx, ny] = self.taps;
         let place = place_of_turn(self.taps, i % (nx * ny));
-        let fx = (f64::from(place % nx) + 0.5) / f64::from(nx) - 0.5;
-        let fy = (f64::from(place / nx) + 0.5) / f64::from(ny) - 0.5;
-        self.dx * fx + self.dy * fy
+        [place % nx, place / nx]
     }
 
     /// Colour of tap `i` around a source.
