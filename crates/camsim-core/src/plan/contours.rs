@@ -14,8 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
-    BlurStage, Holes, LensReach, borders::Crossed, edges::MOST_FINE, levels::Sampling, probes::Probe, prospect::path_px, stairs::Places,
-    surfaces::Surfaces,
+    BlurStage, Holes, LensReach, borders::Crossed, levels::Sampling, probes::Probe, prospect::path_px, stairs::Places, surfaces::Surfaces,
 };
 use crate::{
     camera::CameraModel,
@@ -41,11 +40,6 @@ const RAYS_LEAVE: f64 = 0.42;
 const SAFETY_WITH_RAYS: f64 = 1.2;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
 const LEAST_LEFT: f64 = 0.1;
-/// Time of marks, samples and rays for a picture that is all silhouettes, milliseconds as in `costs.rs`: of a town with ideal frames of 1 to 2.83 times the
-/// camera's scale 320 to 420 where they have 0.29 of it, of the case all-effects 190 for 0.21. So many times that by fine pixels along a side of
-/// each ideal one.
-const RAYS_MS: f64 = 1200.0;
-const FINE_TIMES: [f64; MOST_FINE as usize] = [1.0, 4.5, 6.0];
 /// Lines of three through three by three places, the border's first.
 pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
@@ -90,7 +84,8 @@ pub(super) struct Around {
 /// The same for ideal frames of any scale, and all that may read them.
 #[derive(Clone, Debug)]
 pub(super) struct Outlook {
-    share: f64,
+    /// Of the pixels, at silhouettes.
+    pub share: f64,
     contrast_dn: f64,
     hidden_share: f64,
     /// Mean squared error over the picture by strips, of the linear range.
@@ -182,11 +177,6 @@ impl Outlook {
             once_a_pixel: (unsure * finer * finer).recip(),
             places: Places::new(around.iter().filter_map(Around::place)),
         }
-    }
-
-    /// Of giving pixels at silhouettes rays of their own, with so many fine pixels along a side of each ideal one, milliseconds.
-    pub fn rays_ms(&self, fine: u32) -> f64 {
-        RAYS_MS * self.share * FINE_TIMES[fine.clamp(1, MOST_FINE) as usize - 1]
     }
 
     /// Left as they are.
@@ -493,6 +483,5 @@ pub(super) mod tests {
                 assert!(still.plain_at_best(scale).error_dn < plain.error_dn, "{scale} {taps:?}");
             }
         }
-        assert!(still.rays_ms(2) > still.rays_ms(1), "more pixels cost less than finer ones");
     }
 }

@@ -24,6 +24,8 @@ use crate::{
 /// One place in so many is asked first, and so far above the tolerance these then settle it.
 const FEW: usize = 4;
 const FAR: f64 = 1.7;
+/// Part of what these find that all of them find at least.
+const SURE: f64 = 0.8;
 /// Places that one thread asks at a time: fewer are not worth another.
 const AT_ONCE: usize = 8;
 /// Times what is expected: textures are not equally grainy everywhere.
@@ -37,7 +39,7 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
-const SAMPLES_PER_PX: [f64; 7] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0];
+const SAMPLES_PER_PX: [f64; 9] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 /// What is left of a tolerance and what is taken of it may add up to a little more.
 const ROUNDED: f64 = 1.0 + 1e-9;
 /// Most samples on one polynomial of the path.
@@ -109,26 +111,40 @@ impl Prospect<'_> {
 
     /// The same from one place of `every`.
     fn expected_at(&self, every: usize, sampling: &Sampling, blur: Option<BlurStage>) -> Expected {
-        let [exact, sampled] = self.squares(every, sampling, blur);
+        let exact = self.exact2(every, sampling, blur.is_some());
+        let sampled = blur.map_or(exact, |blur| self.sampled2(every, sampling, blur));
         Expected { resampling_dn: dn(exact), blur_dn: SAFETY * 255.0 * (sampled - exact).max(0.0).sqrt() }
     }
 
-    /// Mean squared errors with the exposure exact, and with its samples.
-    fn squares(&self, every: usize, sampling: &Sampling, blur: Option<BlurStage>) -> [f64; 2] {
-        let &Sampling { scale, surface_reads, taps, .. } = sampling;
-        let of = |sight: &Sight<'_>| {
+    /// Mean squared error with the exposure exact.
+    fn exact2(&self, every: usize, &Sampling { scale, surface_reads, taps, .. }: &Sampling, exposed: bool) -> f64 {
+        self.mean_square(every, |sight| sight.exact2(scale, surface_reads, taps, exposed, self.principal_px))
+    }
+
+    /// The same with its samples.
+    fn sampled2(&self, every: usize, &Sampling { scale, surface_reads, taps, .. }: &Sampling, blur: BlurStage) -> f64 {
+        self.mean_square(every, |sight| {
             let sides = scale * sight.camera_from_px;
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
-            let samples = blur.map(|blur| sight.apart(sample_count(&blur, scale * sight.path_px, &area)));
-            let error = sight.error2(scale, surface_reads, taps, samples, self.principal_px);
-            let weight = sight.weight * sight.gain * sight.gain;
-            [sight.weight, weight * error[0], weight * error[1]]
-        };
+            let samples = sight.apart(sample_count(&blur, scale * sight.path_px, &area));
+            sight.sampled2(scale, surface_reads, taps, samples, self.principal_px)
+        })
+    }
+
+    /// Over the picture, from one place of `every`.
+    fn mean_square(&self, every: usize, square: impl Fn(&Sight<'_>) -> f64 + Sync) -> f64 {
+        let of = |sight: &Sight<'_>| [sight.weight, sight.weight * sight.gain * sight.gain * square(sight)];
         // Summed in their order: a plan does not depend on how threads share work.
-        let squares: Vec<[f64; 3]> = self.sights.par_iter().step_by(every).with_min_len(AT_ONCE).map(of).collect();
-        let [weight, exact, sampled] = squares.iter().fold([0.0; 3], |sum, square| [0, 1, 2].map(|k: usize| sum[k] + square[k]));
-        let part = weight / self.weight();
-        [exact, sampled].map(|sum| sum / (part * self.counted as f64).max(1.0))
+        let squares: Vec<[f64; 2]> = self.sights.par_iter().step_by(every).with_min_len(AT_ONCE).map(of).collect();
+        let [weight, square] = squares.iter().fold([0.0; 2], |sum, square| [0, 1].map(|k: usize| sum[k] + square[k]));
+        square / (weight / self.weight() * self.counted as f64).max(1.0)
+    }
+
+    /// The least that may be expected with all that comes to it, 1/255, as a few places tell; where that is far from a tolerance the rest is not looked at.
+    fn roughly_dn(&self, sampling: &Sampling, blur: Option<BlurStage>, beside_dn: f64, max_error_dn: f64) -> f64 {
+        let exact_dn = dn(self.exact2(FEW, sampling, blur.is_some())).hypot(beside_dn);
+        let is_far = exact_dn > FAR * max_error_dn;
+        if is_far { exact_dn } else { self.expected_at(FEW, sampling, blur).total_dn().hypot(beside_dn) }
     }
 
     /// Of all places.
@@ -165,8 +181,6 @@ impl Prospect<'_> {
         }
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let price = |cost: f64, total_dn: f64| cost * (1.0 - WORTH * (1.0 - total_dn / max_error_dn));
-        // A few places tell what is far from keeping the tolerance.
-        let roughly_dn = |(sampling, blur): (Sampling, _)| self.expected_at(FEW, &sampling, blur).total_dn();
         let exactly = |(sampling, blur): (Sampling, _)| {
             let expected = self.expected(&sampling, blur);
             Sampling { expected, ..sampling }
@@ -183,20 +197,17 @@ impl Prospect<'_> {
             let Some((&last, fewer)) = choices.split_last() else { continue };
             let most = way(sampling, last);
             let Some(beside_most_dn) = beside_dn(&most.0, most.1) else { continue };
-            let rough_dn = roughly_dn(most).hypot(beside_most_dn);
+            let rough_dn = self.roughly_dn(&most.0, most.1, beside_most_dn, max_error_dn);
+            if price(least_cost, SURE * rough_dn.min(max_error_dn)) >= below {
+                continue;
+            }
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
             let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
                 None => failed.push((total_dn, sampling)),
                 Some(tried) => {
-                    let fewer = fewer.iter().map(|&samples| way(sampling, samples)).filter(|way| price(cost(way), 0.0) < below);
-                    let near = fewer.filter(|way| roughly_dn(*way) <= FAR * max_error_dn).filter_map(|way| {
-                        let beside_dn = beside_dn(&way.0, way.1)?;
-                        let found = exactly(way);
-                        Some((cost(&way), found.expected.total_dn().hypot(beside_dn), found))
-                    });
-                    let enough = near.filter(|(_, total_dn, _)| *total_dn <= max_error_dn);
-                    let priced = enough.chain([(cost(&most), total_dn, tried)]).map(|(cost, dn, way)| (price(cost, dn), dn, way));
+                    let enough = self.with_fewer(&sampling, fewer, task, beside_dn).into_iter().chain([(total_dn, tried)]);
+                    let priced = enough.map(|(dn, sampling)| (price(cost(&way(sampling, sampling.samples_per_px)), dn), dn, sampling));
                     let found = priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }
@@ -221,6 +232,31 @@ impl Prospect<'_> {
         let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
         let most = tried.last().copied();
         tried.into_iter().find(|choice| choice.total_dn <= enough_dn).or(most).unwrap_or_else(|| of(way(sampling, 0.0)))
+    }
+
+    /// The same with fewer samples, in ascending order, as far as that keeps the tolerance: halving finds the fewest that do.
+    fn with_fewer(&self, sampling: &Sampling, fewer: &[f64], task: &Task<'_>, beside_dn: &Beside<'_>) -> Vec<(f64, Sampling)> {
+        let mut found = Vec::new();
+        let mut untried = fewer;
+        while let Some(&samples_per_px) = untried.get(untried.len() / 2) {
+            let (before, after) = untried.split_at(untried.len() / 2);
+            let tried = Sampling { samples_per_px, ..*sampling };
+            let within = self.within((tried, tried.tried(task.quality, task.exposure)), task, beside_dn);
+            untried = if within.is_some() { before } else { &after[1..] };
+            found.extend(within);
+        }
+        found
+    }
+
+    /// A way and its error with all that comes to it, 1/255, if that is within the tolerance. A few places tell what is far from it.
+    fn within(&self, (sampling, blur): (Sampling, Option<BlurStage>), task: &Task<'_>, beside_dn: &Beside<'_>) -> Option<(f64, Sampling)> {
+        let beside_dn = beside_dn(&sampling, blur)?;
+        if self.roughly_dn(&sampling, blur, beside_dn, task.max_error_dn) > FAR * task.max_error_dn {
+            return None;
+        }
+        let expected = self.expected(&sampling, blur);
+        let total_dn = expected.total_dn().hypot(beside_dn);
+        (total_dn <= task.max_error_dn).then_some((total_dn, Sampling { expected, ..sampling }))
     }
 
     /// A way of sampling that another frame has chosen.

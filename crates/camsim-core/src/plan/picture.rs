@@ -69,7 +69,7 @@ impl Look<'_> {
             Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
-                if plain.within && plain.price.ms < outlook.rays_ms(1) {
+                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, task.ideal_share) {
                     (plain, true, 1)
                 } else {
                     let (with_rays, fine) = with_rays();
@@ -118,7 +118,8 @@ fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers
         let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
         let choice = prospect
             .choose(task, &|sampling, blur| may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine).error_dn.hypot(layers_dn)));
-        let price = Price { ms: choice.price.ms + outlook.rays_ms(fine), ..choice.price };
+        let rays_ms = prospect.rays_ms(outlook.share, choice.sampling.scale, fine, task.ideal_share);
+        let price = Price { ms: choice.price.ms + rays_ms, ..choice.price };
         (Choice { price, ..choice }, fine)
     };
     let mut failed = Vec::new();

@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::{
     SurfaceReads,
     prospect::Sight,
-    transfer::{Path, SurfaceFilter, Wave, Waves, error2},
+    transfer::{Over, Path, SurfaceFilter, Wave, Waves, error2},
 };
 use crate::temporal::{Footprint, TapStage};
 
@@ -21,7 +21,7 @@ pub(super) struct Parts(Box<Mutex<Known>>);
 struct Known {
     waves: Found<Frame, Waves>,
     filtered: Found<(Frame, SurfaceReads), [f64]>,
-    read: Found<(Frame, TapStage, Option<u32>), [[Wave; 2]]>,
+    read: Found<(Frame, TapStage, Option<u32>), [Wave]>,
 }
 
 /// What was found for each key.
@@ -41,23 +41,35 @@ fn known<K: PartialEq, V: ?Sized>(all: &mut Found<K, V>, key: K, find: impl FnOn
 }
 
 impl Sight<'_> {
-    /// Expected squared error of a pixel here, as [`error2`] has it. `samples`: of the exposure, if it shows; `principal_px`: of the camera.
-    pub fn error2(&self, scale: f64, reads: SurfaceReads, taps: TapStage, samples: Option<u32>, principal_px: DVec2) -> [f64; 2] {
+    /// Expected squared error of a pixel here, as [`error2`] has it, with so many samples of an exposure.
+    pub fn sampled2(&self, scale: f64, reads: SurfaceReads, taps: TapStage, samples: u32, principal_px: DVec2) -> f64 {
+        self.error2(scale, (reads, taps), Over::Samples(Path { along: scale * self.path, samples }), principal_px)
+    }
+
+    /// The same of an exposure that is exact, or of none.
+    pub fn exact2(&self, scale: f64, reads: SurfaceReads, taps: TapStage, exposed: bool, principal_px: DVec2) -> f64 {
+        self.error2(scale, (reads, taps), if exposed { Over::All(scale * self.path) } else { Over::Instant }, principal_px)
+    }
+
+    /// `principal_px`: of the camera.
+    fn error2(&self, scale: f64, (reads, taps): (SurfaceReads, TapStage), over: Over, principal_px: DVec2) -> f64 {
         let sides = scale * self.camera_from_px;
         let texel_from_ideal = self.texel_from_key * scale.recip();
-        let path = samples.map(|samples| Path { along: scale * self.path, samples });
-        let frame = (scale.to_bits(), path.is_some());
+        let (along, samples) = match over {
+            Over::Instant => (None, None),
+            Over::All(along) => (Some(along), None),
+            Over::Samples(path) => (Some(path.along), Some(path.samples)),
+        };
+        let frame = (scale.to_bits(), along.is_some());
         // A place is asked by one thread at a time; what is kept is replaced whole.
         let mut parts = self.parts.0.lock().unwrap_or_else(PoisonError::into_inner);
         let Known { waves, filtered, read } = &mut *parts;
-        let waves = known(waves, frame, || {
-            Arc::new(Waves::new(self.spectrum, texel_from_ideal, self.key_from_camera * sides, path.map(|path| path.along)))
-        });
+        let waves = known(waves, frame, || Arc::new(Waves::new(self.spectrum, texel_from_ideal, self.key_from_camera * sides, along)));
         let filtered = known(filtered, (frame, reads), || waves.filtered(&SurfaceFilter::new(texel_from_ideal, reads)).into());
         let read = known(read, (frame, taps, samples), || {
             let area = Footprint::new(sides.x_axis, sides.y_axis, taps);
             let beside_px = (scale * self.key_px + principal_px).fract_gl();
-            waves.read(&area, path, beside_px).into()
+            waves.read(&area, over, beside_px).into()
         });
         error2(&waves, &filtered, &read)
     }

@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::{
     BlurStage,
     levels::{Sampling, sample_count},
-    transfer::{Path, read_wave, sinc},
+    transfer::{Over, Path, read_wave, sinc},
 };
 use crate::temporal::{Footprint, TapStage};
 
@@ -138,7 +138,7 @@ fn worked_out(&Reading { width_px, taps, exposure }: &Reading) -> f64 {
         let weight = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
         let f = length * DVec2::from_angle(PI * direction);
         let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
-        let found = read_wave(f, &area, path, DVec2::new(beside_x, beside_y))[1];
+        let found = read_wave(f, &area, path.map_or(Over::Instant, Over::Samples), DVec2::new(beside_x, beside_y));
         weight / (4.0 * (PI * length).powi(3)) * (found - DVec2::new(exact, 0.0)).length_squared()
     };
     let square: f64 = (0..WAVES).map(wave).sum();

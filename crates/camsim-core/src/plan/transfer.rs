@@ -187,7 +187,7 @@ impl SurfaceFilter {
     }
 }
 
-/// The exposure: its path, ideal pixels, and the samples on it.
+/// Samples on the path of an exposure, ideal pixels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
     pub along: DVec2,
@@ -307,40 +307,46 @@ impl Waves {
         self.0.iter().map(|wave| filter.leaves(wave.cycles)).collect()
     }
 
-    /// What reading the ideal frame leaves of each, with the mean over the path exact, and with its samples. `beside_px` is where the source lies between
-    /// ideal pixels.
-    pub fn read(&self, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> Vec<[Wave; 2]> {
-        self.0.iter().map(|wave| read_wave(wave.f, area, path, beside_px)).collect()
+    /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
+    pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
+        self.0.iter().map(|wave| read_wave(wave.f, area, over, beside_px)).collect()
     }
+}
+
+/// What reads are taken over.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Over {
+    /// One instant.
+    Instant,
+    /// All of a path.
+    All(DVec2),
+    /// Its samples.
+    Samples(Path),
 }
 
 /// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
-pub(super) fn read_wave(f: DVec2, area: &Footprint, path: Option<Path>, beside_px: DVec2) -> [Wave; 2] {
-    let [mut smooth, mut in_samples] = [Wave::ZERO; 2];
+pub(super) fn read_wave(f: DVec2, area: &Footprint, over: Over, beside_px: DVec2) -> Wave {
     let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
-    for (x, y) in x.iter().flat_map(|x| y.iter().map(move |y| (x, y))) {
+    let seen = x.iter().flat_map(|x| y.iter().map(move |y| (x, y)));
+    let of = |(x, y): (&Alias, &Alias)| {
         let turned = x.read.rotate(y.read);
         if turned.length_squared() < UNSEEN * UNSEEN {
-            continue;
+            return Wave::ZERO;
         }
         let seen = DVec2::new(x.seen, y.seen);
-        let over_area = turned * grid(area, seen);
-        match path {
-            None => smooth += over_area,
-            Some(path) => {
-                smooth += over_area * sinc(path.along.dot(seen));
-                in_samples += turned.rotate(sampled(area, path, seen));
-            }
+        match over {
+            Over::Instant => turned * grid(area, seen),
+            Over::All(along) => turned * grid(area, seen) * sinc(along.dot(seen)),
+            Over::Samples(path) => turned.rotate(sampled(area, path, seen)),
         }
-    }
-    [smooth, if path.is_some() { in_samples } else { smooth }]
+    };
+    seen.map(of).sum()
 }
 
-/// Expected squared error of a pixel, of the linear range: with the mean over the path exact, and with its samples.
-pub(super) fn error2(waves: &Waves, filtered: &[f64], read: &[[Wave; 2]]) -> [f64; 2] {
+/// Expected squared error of a pixel, of the linear range.
+pub(super) fn error2(waves: &Waves, filtered: &[f64], read: &[Wave]) -> f64 {
     let parts = waves.0.iter().zip(filtered).zip(read);
-    let error = |wave: &Seen, found: Wave| wave.power * (found - Wave::new(wave.exact, 0.0)).length_squared();
-    parts.fold([0.0; 2], |sums, ((wave, &ideal), read)| [0, 1].map(|k: usize| sums[k] + error(wave, ideal * read[k])))
+    parts.map(|((wave, &ideal), &read)| wave.power * (ideal * read - Wave::new(wave.exact, 0.0)).length_squared()).sum()
 }
 
 #[cfg(test)]
@@ -496,7 +502,7 @@ mod tests {
         let error = |stage, beside_px| {
             let area = Footprint::new(DVec2::X, DVec2::Y, stage);
             let waves = Waves::new(&spectrum, DMat2::IDENTITY, DMat2::IDENTITY, None);
-            error2(&waves, &waves.filtered(&filter), &waves.read(&area, None, beside_px))[0]
+            error2(&waves, &waves.filtered(&filter), &waves.read(&area, Over::Instant, beside_px))
         };
         let half = DVec2::splat(0.5);
         assert!(error(TapStage::Bilinear, half) > 2.0 * error(TapStage::Bilinear, DVec2::ZERO));
