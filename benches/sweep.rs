@@ -1,8 +1,9 @@
 //! What a frame of `benches/all_effects.toml` costs by size, by length of blur, by effect and by file format, each table with the paper's
-//! preset of the same frames in the same rounds; and what the houses of `benches/houses.toml` add to their terrain.
+//! preset of the same frames in the same rounds; what the houses of `benches/houses.toml` add to their terrain; and what the plan takes ways of
+//! sampling to cost beside what they take.
 //!
 //! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `passes`,
-//! `houses`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
+//! `houses`, `costs`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
 
@@ -12,13 +13,16 @@ use camsim::{
     core::{
         frame::COORDS_CHANNELS,
         plan::FramePlan,
-        scenario::Channel,
+        scenario::{Auto, Channel, Silhouettes},
         scene::{ModelDetail, SceneLevels},
         sequence::Sequence,
     },
     gpu::{AdapterChoice, Engine},
     io::{load::load_sequence, scenario_file::read_scenario},
-    lab::timing::{peak_memory_mb, quartiles},
+    lab::{
+        cases::cases,
+        timing::{peak_memory_mb, quantile, quartiles},
+    },
 };
 
 mod flight;
@@ -45,9 +49,15 @@ fn main() -> Outcome<()> {
     let engine = Engine::new(AdapterChoice::Best)?;
     println!("adapter   {}", engine.gpu().adapter);
     println!("frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table");
-    for (name, table) in
-        [("size", size as fn(&Engine, bool) -> Outcome<()>), ("blur", blur), ("effects", effects), ("passes", passes), ("houses", houses)]
-    {
+    let tables = [
+        ("size", size as fn(&Engine, bool) -> Outcome<()>),
+        ("blur", blur),
+        ("effects", effects),
+        ("passes", passes),
+        ("houses", houses),
+        ("costs", costs),
+    ];
+    for (name, table) in tables {
         if wanted.is_empty() || wanted.iter().any(|wanted| wanted == name) {
             table(&engine, is_measuring)?;
         }
@@ -234,6 +244,78 @@ fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     }
     println!("\nrounds    of {} frames, with and without in turn; medians, of ratios too", EFFORT_HOUSES.burst);
     Ok(())
+}
+
+/// Cases of `camsim bench` and scenarios of this folder, and the scales, reads along a side and samples with which each is made.
+const COSTLY: [&str; 7] = ["plane-30", "terrain-100", "lens-s3", "lens-tangential", "blender-plane", "exposure-100", "all-effects"];
+const COSTLY_FILES: [&str; 2] = ["benches/all_effects.toml", "benches/houses.toml"];
+const COST_SCALES: [f64; 3] = [1.0, 1.6, 2.5];
+const COST_TAPS: [Auto<u32>; 4] = [Auto::Auto, Auto::Value(1), Auto::Value(2), Auto::Value(4)];
+const COST_SAMPLES: [u32; 2] = [3, 16];
+/// Frames of each, one by one so that nothing overlaps; the first compiles.
+const COST_FRAMES: u64 = 4;
+
+/// What the plan takes the ideal and the reverse pass to cost beside what they take, by the device's clock: many ways of sampling, silhouettes left as they
+/// are. Only where its milliseconds come from the ratio should be near 1; anywhere ratios should be alike.
+fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let mut sequences = Vec::new();
+    for case in cases()?.into_iter().filter(|case| COSTLY.contains(&case.name)).take(if is_measuring { COSTLY.len() } else { 1 }) {
+        sequences.push((case.name, case.sequence, 0));
+    }
+    for file in COSTLY_FILES.into_iter().filter(|_| is_measuring) {
+        sequences.push((file, sequence_of(file, &[])?, 40));
+    }
+    println!("\n| case | ways | ideal, ms | foretold, times | reverse, ms | foretold, times |");
+    println!("|---|---|---|---|---|---|");
+    for (name, sequence, first) in sequences {
+        let exposed = sequence.scenario.camera.shutter.exposure_ms > 0.0;
+        let samples = if exposed { COST_SAMPLES.map(Auto::Value).to_vec() } else { vec![Auto::Auto] };
+        let (mut taken, mut foretold) = ([vec![], vec![]], [vec![], vec![]]);
+        let ways = || COST_SCALES.iter().flat_map(|scale| COST_TAPS.iter().map(move |taps| (*scale, *taps)));
+        for ((scale, taps), samples) in samples.into_iter().flat_map(|samples| ways().map(move |way| (way, samples))) {
+            let mut forced = Sequence::clone(&sequence);
+            let quality = &mut forced.scenario.quality;
+            (quality.frames_per_ideal, quality.silhouettes, quality.ideal_scale) = (1, Silhouettes::Plain, Auto::Value(scale));
+            (quality.footprint_taps, quality.blur_samples) = (taps, samples);
+            let Some(way) = pass_times(engine, Arc::new(forced), first)? else {
+                println!("\nthe adapter has no time stamps: no passes");
+                return Ok(());
+            };
+            for (k, [ms, price]) in way.into_iter().enumerate() {
+                taken[k].push(ms);
+                foretold[k].push(price / ms);
+            }
+        }
+        let cells = [0, 1].map(|k: usize| {
+            let ([least, most], [low, middle, high]) = ([0.0, 1.0].map(|part| quantile(&taken[k], part)), quartiles(&foretold[k]));
+            format!("{least:.1} .. {most:.1} | {middle:.2} ({low:.2} .. {high:.2})")
+        });
+        println!("| {name} | {} | {} |", taken[0].len(), cells.join(" | "));
+    }
+    println!("\ndevice time of each way: median of {} frames, rendered one by one; medians and quartiles over the ways", COST_FRAMES - 1);
+    Ok(())
+}
+
+/// Of the ideal and the reverse pass what they take and what the plan takes them to cost, milliseconds; `None` without time stamps.
+fn pass_times(engine: &Engine, sequence: Arc<Sequence>, first: u64) -> Outcome<Option<[[f64; 2]; 2]>> {
+    let frames = sequence.frames;
+    let mut session = engine.session::<Infallible>(sequence, &[Channel::Color])?;
+    if !session.time_passes() {
+        return Ok(None);
+    }
+    let (mut taken, mut price) = ([vec![], vec![]], [0.0; 2]);
+    for k in 0..COST_FRAMES {
+        session.forget();
+        session.render::<Infallible>([(first + k) % frames], &mut |finished| {
+            let plan = &finished.plan;
+            price = [plan.ideal_price_ms, plan.price_ms - plan.ideal_price_ms];
+            for (times, name) in taken.iter_mut().zip(["ideal", "reverse"]).filter(|_| k > 0) {
+                times.extend(finished.times.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms));
+            }
+            Ok(())
+        })?;
+    }
+    Ok(Some([0, 1].map(|k: usize| [quartiles(&taken[k])[1], price[k]])))
 }
 
 /// How frame 40 is made.
