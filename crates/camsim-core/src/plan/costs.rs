@@ -145,3 +145,54 @@ fn footprint_ms(stage: TapStage, area: &Footprint, samples: Option<u32>) -> f64 
         TapStage::SplineOrGrid { .. } => of(EITHER_SAMPLES_MS),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::sync::Arc;
+
+    use glam::{DVec2, DVec3};
+
+    use super::*;
+    use crate::scene::{Encoding, Mesh, Terrain, Texture};
+
+    #[test]
+    fn the_kernel_that_knows_splines_and_grids_takes_longer_than_those_that_know_one() {
+        for width_px in [1.0, 2.0, 3.0, 4.0] {
+            let ms = |stage: TapStage, samples: Option<u32>| {
+                footprint_ms(stage, &Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, stage), samples)
+            };
+            for samples in [None, Some(16), Some(40)] {
+                let either = ms(TapStage::SplineOrGrid { most: 4 }, samples);
+                for other in [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 4 }] {
+                    assert!(ms(other, samples) < either, "{width_px} {other:?} {samples:?}");
+                }
+                assert!(ms(TapStage::Bilinear, samples) < ms(TapStage::Spline, samples));
+            }
+        }
+    }
+
+    #[test]
+    fn reads_of_two_versions_take_longer_and_grids_end_where_one_read_does() {
+        let ms = |texels: f64, reads: SurfaceReads| surface_ms(DMat2::from_diagonal(DVec2::splat(texels)), reads);
+        for reads in SurfaceReads::ALL {
+            assert!(ms(0.3, reads) < ms(4.0, reads), "{reads:?}");
+        }
+        assert!(ms(0.3, SurfaceReads::Grid) < ms(0.3, SurfaceReads::Four), "one of up to 64");
+        assert!(ms(4.0, SurfaceReads::Grid) > ms(0.3, SurfaceReads::Grid) + SURFACE_READ_MS);
+    }
+
+    #[test]
+    fn few_triangles_take_their_time_and_many_what_a_level_of_detail_leaves() {
+        let picture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+        let heights = |side: u32| Terrain::from_heights(side, side, 10.0, &vec![0.0; (side * side) as usize], None).unwrap();
+        let of = |terrain: Option<Terrain>, meshes: Vec<Mesh>| Drawn::new(&Scene { terrain, meshes, ..Scene::default() });
+        assert_eq!(Drawn::new(&Scene::default()).ms(1.0), 0.0);
+        let of_64_cells = 1e-3 * TRIANGLES_MS * 2.0 * 64.0 * 64.0;
+        assert!((of(Some(heights(65)), vec![]).ms(2.0) - of_64_cells).abs() < 1e-9);
+        assert_eq!(of(Some(heights(513)), vec![]).ms(2.0), TERRAIN_MS[0] + 2.0 * TERRAIN_MS[1]);
+        let square = Mesh::level_picture(picture, DVec3::ZERO, 5.0);
+        assert!((of(None, vec![square; 500]).ms(1.0) - TRIANGLES_MS).abs() < 1e-9, "a thousand triangles");
+    }
+}
