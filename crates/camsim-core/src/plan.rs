@@ -49,8 +49,9 @@ mod sharing;
 mod sight;
 mod stages;
 mod stairs;
+pub(crate) mod surface_filter;
 mod surfaces;
-pub(crate) mod transfer;
+mod transfer;
 
 use look::{Look, Scenery};
 

@@ -11,7 +11,7 @@ use super::{
     BlurStage, SurfaceReads,
     levels::{Sampling, sample_count},
     prospect::{Prospect, Sight},
-    transfer::SurfaceFilter,
+    surface_filter::SurfaceFilter,
 };
 use crate::{
     scene::Scene,

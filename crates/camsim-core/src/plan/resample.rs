@@ -9,7 +9,8 @@ use glam::DVec2;
 use super::{
     SurfaceReads,
     prospect::Sight,
-    transfer::{Over, Path, SurfaceFilter, Wave, Waves, error2},
+    surface_filter::SurfaceFilter,
+    transfer::{Over, Path, Wave, Waves, error2},
 };
 use crate::temporal::{Footprint, TapStage};
 

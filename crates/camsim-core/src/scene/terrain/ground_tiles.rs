@@ -220,7 +220,7 @@ mod tests {
         *,
     };
     use crate::{
-        plan::transfer::SurfaceFilter,
+        plan::surface_filter::SurfaceFilter,
         scene::{Encoding, Texture},
     };
 
