@@ -3,7 +3,7 @@
 //! A plan is plain data and a pure function of scenario and frame number: `camsim explain` prints it, the gpu crate executes it, and
 //! nothing in it depends on the frame before.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use glam::DVec2;
 
@@ -53,6 +53,7 @@ pub(crate) mod surface_filter;
 mod surfaces;
 mod transfer;
 
+use kept::Kept;
 use look::{Look, Scenery};
 
 pub use bounds::LensReach;
@@ -74,6 +75,9 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
+/// Frames and groups of which what was found is remembered: as many as are looked at together, and to spare for threads that are ahead.
+const FRAMES_KEPT: usize = 64;
+const GROUPS_KEPT: usize = 4;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
 
@@ -91,11 +95,11 @@ pub struct Planner {
     max_side_px: u32,
     max_ideal_px: u64,
     /// What the probes of the last frames see around them.
-    around: kept::Kept<Vec<contours::Around>>,
+    around: Kept<Vec<contours::Around>>,
     /// The last groups of frames that were looked at.
-    groups: Mutex<sharing::Recent>,
+    groups: Kept<sharing::Group>,
     /// The last plan of a frame by itself: whoever asks whether it can be planned asks for it again.
-    last: Mutex<Option<FramePlan>>,
+    last: Kept<FramePlan>,
 }
 
 impl Planner {
@@ -151,9 +155,9 @@ impl Planner {
             truth,
             max_side_px,
             max_ideal_px,
-            around: kept::Kept::default(),
-            groups: Mutex::default(),
-            last: Mutex::default(),
+            around: Kept::new(FRAMES_KEPT),
+            groups: Kept::new(GROUPS_KEPT),
+            last: Kept::new(1),
         })
     }
 
@@ -202,15 +206,11 @@ impl Planner {
 
     /// The plan of a frame by itself.
     fn plan_alone(&self, frame: u64) -> Result<FramePlan, PlanError> {
-        // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
-        let last = || self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = last().as_ref().filter(|known| known.frame == frame) {
-            return Ok(known.clone());
-        }
-        let look = self.look(frame, None)?;
-        let plan = self.plan_of(&look, &look.scenery())?;
-        *last() = Some(plan.clone());
-        Ok(plan)
+        let find = || {
+            let look = self.look(frame, None)?;
+            self.plan_of(&look, &look.scenery())
+        };
+        self.last.try_of(frame, find).map(|plan| FramePlan::clone(&plan))
     }
 
     fn plan_of(&self, look: &Look<'_>, scenery: &Scenery<'_>) -> Result<FramePlan, PlanError> {

@@ -3,14 +3,10 @@
 //!
 //! Frames are looked at in groups that begin at multiples of `quality.frames_per_ideal`, so that which of them share depends on the scenario alone. The
 //! ideal frame is taken in the middle of their time, wide and fine enough for all of them. Each of them is then planned as any other: from this one key frame,
-//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise, or where that saves little, each of its halves
+//! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise, or where halves could save more, each of its halves
 //! is tried, and so on. Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind them.
 
-use std::{
-    collections::VecDeque,
-    ops::Range,
-    sync::{Arc, OnceLock, PoisonError},
-};
+use std::{ops::Range, sync::OnceLock};
 
 use rayon::prelude::*;
 
@@ -30,8 +26,6 @@ const MOST_AREA: f64 = 4.0;
 const SHARES: [f64; 3] = [1.0, 1.0, 0.85];
 /// From so many frames on the halves of a group are tried each for itself.
 const FAR: u64 = 8;
-/// Groups that are remembered: frames are asked for in order, by a few threads.
-const REMEMBERED: usize = 4;
 
 /// The ideal frame of several output frames.
 #[derive(Debug)]
@@ -114,16 +108,11 @@ impl Common {
 
 /// Frames that were looked at together.
 #[derive(Debug)]
-struct Group {
-    number: u64,
+pub(super) struct Group {
     first: u64,
     /// In order; `None` where a frame is to be planned by itself.
     plans: Vec<Option<FramePlan>>,
 }
-
-/// The groups that were asked for last.
-#[derive(Debug, Default)]
-pub(super) struct Recent(VecDeque<Arc<Group>>);
 
 impl Planner {
     /// Number of the group of a frame: frames of one are best planned one after the other, by the same thread.
@@ -135,8 +124,8 @@ impl Planner {
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
     pub fn forget(&self) {
         self.around.forget();
-        self.groups.lock().unwrap_or_else(PoisonError::into_inner).0.clear();
-        *self.last.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        self.groups.forget();
+        self.last.forget();
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -145,21 +134,7 @@ impl Planner {
             return None;
         }
         let number = self.group_of(frame);
-        // What is kept is replaced whole: a panic elsewhere leaves nothing half done. Nobody waits for a group while holding it.
-        let recent = || self.groups.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = recent().0.iter().find(|group| group.number == number).cloned();
-        let group = match known {
-            Some(group) => group,
-            None => {
-                let group = Arc::new(self.group(number));
-                let mut recent = recent();
-                recent.0.push_back(group.clone());
-                if recent.0.len() > REMEMBERED {
-                    recent.0.pop_front();
-                }
-                group
-            }
-        };
+        let group = self.groups.of(number, || self.group(number));
         group.plans.get((frame - group.first) as usize).cloned().flatten()
     }
 
@@ -209,7 +184,7 @@ impl Planner {
                 }
             }
         }
-        Group { number, first, plans }
+        Group { first, plans }
     }
 
     /// Plans of `frames` from one ideal frame, or from those of its halves, whichever takes less time; `None` for those that do not share.

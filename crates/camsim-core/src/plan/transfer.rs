@@ -249,7 +249,10 @@ pub(super) fn error2(waves: &Waves, filtered: &[f64], read: &[Wave]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::temporal::{ColorImage, TapStage};
+    use crate::{
+        plan::SurfaceReads,
+        temporal::{ColorImage, TapStage},
+    };
 
     /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.
     fn measured(f: DVec2, softness: Option<f64>, at: DVec2, exact: f64) -> f64 {
