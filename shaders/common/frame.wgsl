@@ -63,6 +63,8 @@ struct Frame {
     key_rows: u32,
     exposure_share: f32,
     pad3: u32,
+    // Of each ideal frame: the plane that look-ups of depth begin with, whose inverse planar depth is the product with (u, v, 1), 1/m.
+    planes: array<vec4<f32>, 4>,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

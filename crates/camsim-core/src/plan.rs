@@ -39,6 +39,7 @@ mod look;
 mod motion;
 pub mod paper;
 mod picture;
+mod plane;
 mod predicted;
 mod probes;
 mod prospect;
@@ -68,6 +69,7 @@ pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
 pub use layers::Layers;
 pub use lines::{LinePoses, LineTimes, line_poses, line_times, row_records};
 pub use paper::LinearFog;
+pub use plane::SeenPlane;
 pub use predicted::Predicted;
 pub use refusal::{MAX_IDEAL_PX, PlanError};
 pub use sight::Sight;
@@ -289,6 +291,7 @@ impl Planner {
         }
         motion::note_skips(&motion, temporal, &mut skipped);
         let looks_behind = edges.has_rays() && matches!(temporal, TemporalStage::Reproject { .. });
+        let plane = truths.plane();
         predicted.holes_of_one = looks_behind.then(|| truths.holes(&[look.key()], quality.max_error_px));
         let for_layers = match look.common {
             None if quality.key_frames == Auto::Auto && scenery.layers.is_some() => {
@@ -339,6 +342,7 @@ impl Planner {
             key_pose: look.path().pose(middle_s),
             key_twist,
             keys,
+            plane,
             shared_by: None,
             alone: None,
             ideal,

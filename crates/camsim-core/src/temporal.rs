@@ -111,6 +111,17 @@ pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> 
     }
 }
 
+/// What look-ups know of an ideal frame.
+#[derive(Clone, Copy, Debug)]
+pub struct KeyView<'a> {
+    /// Its pixels.
+    pub ideal: &'a IdealGeometry,
+    /// Its depth.
+    pub depth: &'a InverseDepthImage<'a>,
+    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m ([`crate::plan::SeenPlane`]). 0: infinitely far.
+    pub plane: DVec3,
+}
+
 /// Where an output ray looks in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
@@ -123,16 +134,10 @@ pub struct Source {
 /// Exact relative pose, depth by fixed-point iteration; `None` behind the key camera or outside the ideal frame.
 ///
 /// A point at planar depth z on the ray d = (u, v, 1) is `z (R d + w t)` in the key camera, w = 1/z. The key frame's inverse depth w_key
-/// there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the error by `(parallax px) |grad w| / w`.
+/// there gives `w = w_key (R d)_z / (1 - t_z w_key)`. Each look-up shrinks the error by `(parallax px) |grad w| / w`, beginning with that of the plane.
 #[must_use]
-pub fn reproject(
-    uv: DVec2,
-    key_from_line: (DMat3, DVec3),
-    iterations: u32,
-    depth: &InverseDepthImage<'_>,
-    ideal: &IdealGeometry,
-) -> Option<Source> {
-    source_at(uv, key_from_line, settle(uv, key_from_line, 0.0, iterations, depth, ideal).on_line, ideal)
+pub fn reproject(uv: DVec2, key_from_line: (DMat3, DVec3), iterations: u32, key: &KeyView<'_>) -> Option<Source> {
+    source_at(uv, key_from_line, settle(uv, key_from_line, None, iterations, key).on_line, key.ideal)
 }
 
 /// Sources at the nodes of an exposure, whose poses relative to the key are `nodes`, in order of time; `mid` is that of mid-exposure.
@@ -143,20 +148,26 @@ pub fn reproject_nodes(
     mid: (DMat3, DVec3),
     depths: NodeDepths,
     iterations: u32,
-    depth: &InverseDepthImage<'_>,
-    ideal: &IdealGeometry,
+    key: &KeyView<'_>,
 ) -> Vec<Option<Source>> {
-    let looked_up = |pose, guess, iterations| settle(uv, pose, guess, iterations, depth, ideal).in_key;
+    let looked_up = |pose, guess, iterations| settle(uv, pose, guess, iterations, key).in_key;
     let (Some(&begin), Some(&end)) = (nodes.first(), nodes.last()) else { return Vec::new() };
-    let first = looked_up(begin, 0.0, iterations);
-    let begun_with = |pose, guess| looked_up(pose, guess, iterations.max(2) - 1);
+    let begun_with = |pose, guess| looked_up(pose, Some(guess), iterations.max(2) - 1);
+    let steps = (nodes.len() - 1).max(1) as f64;
     let found: Vec<f64> = match depths {
-        NodeDepths::Mid => vec![looked_up(mid, 0.0, iterations); nodes.len()],
+        NodeDepths::Mid => vec![looked_up(mid, None, iterations); nodes.len()],
         NodeDepths::Ends => {
-            let step = (begun_with(end, first) - first) / (nodes.len() - 1).max(1) as f64;
+            let first = looked_up(begin, None, iterations);
+            let step = (begun_with(end, first) - first) / steps;
             (0..nodes.len()).map(|node| first + node as f64 * step).collect()
         }
+        NodeDepths::Three => {
+            let middle = looked_up(mid, None, iterations);
+            let between = through_three([begun_with(begin, middle), middle, begun_with(end, middle)]);
+            (0..nodes.len()).map(|node| between(node as f64 / steps)).collect()
+        }
         NodeDepths::Each => {
+            let first = looked_up(begin, None, iterations);
             let next = |before: &mut f64, &pose: &(DMat3, DVec3)| {
                 *before = begun_with(pose, *before);
                 Some(*before)
@@ -164,7 +175,14 @@ pub fn reproject_nodes(
             std::iter::once(first).chain(nodes[1..].iter().scan(first, next)).collect()
         }
     };
-    nodes.iter().zip(found).map(|(&pose, found)| reproject_with(uv, pose, found, ideal)).collect()
+    nodes.iter().zip(found).map(|(&pose, found)| reproject_with(uv, pose, found, key.ideal)).collect()
+}
+
+/// The parabola through what there is at the shares 0, 1/2 and 1.
+pub(crate) fn through_three([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
+    let slope = 4.0 * middle - 3.0 * begin - end;
+    let bend = 2.0 * begin + 2.0 * end - 4.0 * middle;
+    move |share| begin + share * (slope + share * bend)
 }
 
 /// Where a surface of the inverse depth `found` (1/m) in the key frame is seen: the last step of [`reproject`].
@@ -182,20 +200,17 @@ struct Settled {
     on_line: f64,
 }
 
-/// `guess`: what the key frame is taken to have there at first, 1/m.
-fn settle(
-    uv: DVec2,
-    key_from_line: (DMat3, DVec3),
-    guess: f64,
-    iterations: u32,
-    depth: &InverseDepthImage<'_>,
-    ideal: &IdealGeometry,
-) -> Settled {
+/// `guess`: what the key frame is taken to have there at first, 1/m; `None` begins with the plane.
+fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), guess: Option<f64>, iterations: u32, key: &KeyView<'_>) -> Settled {
     let (rotation, shift) = key_from_line;
     let direction = rotation * uv.extend(1.0);
-    let mut settled = Settled { in_key: guess, on_line: depth_on_line(direction, shift, guess).unwrap_or(0.0) };
+    let on_line = match guess {
+        Some(guess) => depth_on_line(direction, shift, guess).unwrap_or(0.0),
+        None => plane_on_line(direction, shift, key.plane),
+    };
+    let mut settled = Settled { in_key: guess.unwrap_or(0.0), on_line };
     for _ in 0..iterations {
-        let in_key = depth.inverse_depth(ideal.px_from_point(direction + settled.on_line * shift));
+        let in_key = key.depth.inverse_depth(key.ideal.px_from_point(direction + settled.on_line * shift));
         settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
     }
     settled
@@ -207,6 +222,13 @@ fn source_at(uv: DVec2, key_from_line: (DMat3, DVec3), w: f64, ideal: &IdealGeom
     let in_key = rotation * uv.extend(1.0) + w * shift;
     let at_px = ideal.px_from_point(in_key);
     (in_key.z > 0.0 && ideal.contains(at_px)).then_some(Source { at_px, inverse_depth: w })
+}
+
+/// The inverse depth of a plane on the line's ray, 1/m: `n . z (R d + w t) = 1` gives `w = n . R d / (1 - n . t)`. 0 beyond its horizon and where the line's camera
+/// is not before it.
+pub(crate) fn plane_on_line(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
+    let before = 1.0 - plane.dot(shift);
+    if before > 1e-3 { plane.dot(direction).max(0.0) / before } else { 0.0 }
 }
 
 /// `None` at or behind the line's own image plane.
@@ -332,11 +354,18 @@ mod tests {
             let d = uv.extend(1.0);
             let z = (1.0 - normal.dot(shift)) / normal.dot(rotation * d);
             let exact = ideal.px_from_point(rotation * d * z + shift);
-            let found = reproject(uv, (rotation, shift), 12, &depth, &ideal).expect("in view");
+            let key = |plane| KeyView { ideal: &ideal, depth: &depth, plane };
+            let far = key(DVec3::ZERO);
+            let found = reproject(uv, (rotation, shift), 12, &far).expect("in view");
             // f32 depth: 6e-8 relative times about 8 px of parallax.
             assert!((found.at_px - exact).length() < 2e-6 && (found.inverse_depth * z - 1.0).abs() < 1e-6, "{found:?} {exact}");
-            let two = reproject(uv, (rotation, shift), 2, &depth, &ideal).expect("in view");
+            let two = reproject(uv, (rotation, shift), 2, &far).expect("in view");
             assert!((two.at_px - exact).length() < 0.2, "two look-ups: {}", (two.at_px - exact).length());
+            // Begun with the plane there is nothing to look for.
+            let none = reproject(uv, (rotation, shift), 0, &key(normal)).expect("in view");
+            assert!((none.at_px - exact).length() < 1e-10, "no look-up: {}", (none.at_px - exact).length());
+            let one = reproject(uv, (rotation, shift), 1, &key(1.1 * normal)).expect("in view");
+            assert!((one.at_px - exact).length() < 0.05, "a plane that is off by a tenth: {}", (one.at_px - exact).length());
         }
     }
 

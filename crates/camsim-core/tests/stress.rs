@@ -9,7 +9,7 @@ use camsim_core::{
     plan::PathStage,
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
-    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, displacement::Twist, gather, reproject},
+    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyView, displacement::Twist, gather, reproject},
 };
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -150,6 +150,7 @@ fn a_second_of_rolling_shutter_over_buildings() {
     let camera = CameraModel::from_spec(&spec).unwrap();
     let shutter = Shutter::from_spec(&readout, 30.0, spec.size_px).unwrap();
     let depth = InverseDepthImage { size_px: ideal.geometry.size_px, values: &ideal.inverse_depth };
+    let key = KeyView { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO };
     let pipelines = [Solver::Linear, Solver::Rk2, Solver::Reproject]
         .map(|solver| Pipeline::new(&spec, &ideal, &motion, &Settings { solver: Some(solver), ..Settings::default() }).unwrap());
     let mut errors: [Vec<f64>; 4] = Default::default();
@@ -163,7 +164,7 @@ fn a_second_of_rolling_shutter_over_buildings() {
             continue;
         }
         let exact = ideal.geometry.px_from_point(hit);
-        let two_looks = reproject(uv, (rotation, shift), 2, &depth, &ideal.geometry);
+        let two_looks = reproject(uv, (rotation, shift), 2, &key);
         let found = pipelines.iter().map(|pipeline| pipeline.source([x, y], 0.0).ok()).chain([two_looks]);
         for (errors, found) in errors.iter_mut().zip(found) {
             errors.push(found.unwrap().at_px.distance(exact));

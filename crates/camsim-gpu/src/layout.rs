@@ -1,7 +1,7 @@
 //! `repr(C)` mirrors of the shader structs; a test compares their offsets with naga's reflection.
 
 use bytemuck::{Pod, Zeroable};
-use camsim_core::scene::MeshVertex;
+use camsim_core::{plan::MAX_KEYS, scene::MeshVertex};
 
 /// Mirror of `Frame` in shaders/common/frame.wgsl.
 #[repr(C)]
@@ -48,6 +48,7 @@ pub struct FrameUniforms {
     pub key_rows: u32,
     pub exposure_share: f32,
     pub pad3: u32,
+    pub planes: [[f32; 4]; MAX_KEYS as usize],
 }
 
 /// Mirror of `IdealCamera` in shaders/ideal/camera.wgsl.
@@ -208,6 +209,7 @@ mod tests {
                 key_rows,
                 exposure_share,
                 pad3,
+                planes,
             ]
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);

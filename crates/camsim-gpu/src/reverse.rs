@@ -7,7 +7,7 @@ use std::collections::{HashMap, hash_map::Entry};
 
 use camsim_core::{
     photometric::is_mono,
-    plan::{EdgeStage, FramePlan, LinearFog, NEAR_M, RayStage, TemporalStage, table_shape},
+    plan::{EdgeStage, FramePlan, LinearFog, MAX_KEYS, NEAR_M, RayStage, TemporalStage, table_shape},
     scenario::Scenario,
     shutter::LinesAxis,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
@@ -325,6 +325,10 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
     let lens = |i: usize| plan.camera.lens.coefficients().get(i).map_or(0.0, |&k| k as f32);
     let linear_fog = plan.linear_fog.map_or([0.0; 4], |LinearFog { sky_stored: [r, g, b], end_m }| [r, g, b, (1.0 / end_m) as f32]);
+    let mut planes = [[0.0; 4]; MAX_KEYS as usize];
+    for (plane, key) in planes.iter_mut().zip(&plan.keys) {
+        *plane = plan.plane.seen_from(&key.pose).as_vec3().extend(0.0).to_array();
+    }
     let (edge_scale, edge_samples) = match plan.edges {
         EdgeStage::None => (1, 0),
         EdgeStage::Supersampled { scale, samples, .. } => (scale, samples),
@@ -372,6 +376,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
         linear_fog,
+        planes,
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
         key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),
         ..FrameUniforms::default()

@@ -69,6 +69,7 @@ embedded![
     "reverse/gather/nodes/ends.wgsl",
     "reverse/gather/nodes/mid.wgsl",
     "reverse/gather/nodes/solved.wgsl",
+    "reverse/gather/nodes/three.wgsl",
     "reverse/gather/path/parabola.wgsl",
     "reverse/gather/path/quartic.wgsl",
     "reverse/gather/path/straight.wgsl",

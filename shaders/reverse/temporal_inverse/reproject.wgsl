@@ -1,7 +1,7 @@
 // Exact relative pose, depth by fixed-point iteration.
 // A point at planar depth z on the ray d = (u, v, 1) of the line's camera is z (R d + w t) in the key camera, w = 1/z.
 // The key frame's depth there, 1/w_key, gives w = w_key (R d)_z / (1 - t_z w_key). The error shrinks by about
-// (parallax in px) * |grad w| / w with each look-up.
+// (parallax in px) * |grad w| / w with each look-up, beginning with that of a plane.
 // Twin: camsim_core::temporal::reproject.
 #import reverse/temporal_inverse/interface.wgsl
 #import reverse/temporal_inverse/pose_table.wgsl
@@ -19,9 +19,17 @@ fn look(direction: vec3<f32>, shift: vec3<f32>, before: Settled) -> Settled {
     return Settled(in_key, depth_on_line(direction, shift, in_key, before.on_line));
 }
 
-// Beginning with what is infinitely far.
+// Inverse depth of the key frame's plane on the line's ray: n . z (R d + w t) = 1 gives w = n . R d / (1 - n . t). 0 beyond its horizon and where the line's
+// camera is not before it.
+fn plane_on_line(direction: vec3<f32>, shift: vec3<f32>) -> f32 {
+    let plane = frame.planes[key_number()].xyz;
+    let before = 1.0 - dot(plane, shift);
+    return select(0.0, max(dot(plane, direction), 0.0) / before, before > 1e-3);
+}
+
+// Beginning with the plane.
 fn settle(direction: vec3<f32>, shift: vec3<f32>) -> Settled {
-    return first_looks(direction, shift, Settled(0.0, 0.0));
+    return first_looks(direction, shift, Settled(0.0, plane_on_line(direction, shift)));
 }
 
 fn temporal_inverse(uv: vec2<f32>, pose: Pose) -> Source {

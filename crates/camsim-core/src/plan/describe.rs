@@ -131,6 +131,7 @@ impl FramePlan {
                 let depth = match (self.temporal, blur.depths) {
                     (TemporalStage::Reproject { .. }, NodeDepths::Mid) => " of one depth",
                     (TemporalStage::Reproject { .. }, NodeDepths::Ends) => " with depth of both ends",
+                    (TemporalStage::Reproject { .. }, NodeDepths::Three) => " with depth of both ends and the middle",
                     _ => "",
                 };
                 let curve = match blur.path {

@@ -16,7 +16,7 @@ use crate::{
     scene::{TerrainDetail, TerrainHit},
     shutter::Shutter,
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
-    temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist},
+    temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist, plane_on_line, through_three},
 };
 
 /// Look-ups that are tried.
@@ -38,6 +38,8 @@ pub(super) struct Trial<'a> {
     pub twist: Option<Twist>,
     /// Whether these read the nearest texel's depth.
     pub nearest_depth: bool,
+    /// The plane that look-ups begin with in the key camera ([`super::SeenPlane`]), 1/m; 0: infinitely far.
+    pub plane: DVec3,
 }
 
 /// Where a probe truly looks.
@@ -122,10 +124,11 @@ impl Trial<'_> {
         let mut outcome =
             Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
         let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16) };
-        let places = settle(probe.uv, truth.in_key, 0.0, self.ideal, &mut depth);
+        let places = self.settle(probe.uv, truth.in_key, None, &mut depth);
         outcome.after = places.map(off);
+        outcome.after[0] = outcome.parallax_px;
         let elsewhere = self.key_inverse_depth(probe, if truth.share > 0.5 { 0.0 } else { 1.0 });
-        let begun_there = settle(probe.uv, truth.in_key, elsewhere, self.ideal, &mut depth).map(off);
+        let begun_there = self.settle(probe.uv, truth.in_key, Some(elsewhere), &mut depth).map(off);
         outcome.handed_on = std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after[n]));
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
@@ -149,7 +152,7 @@ impl Trial<'_> {
         if truth.t_s == mid_s {
             return None;
         }
-        let looked_at = settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), 0.0, self.ideal, depth);
+        let looked_at = self.settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), None, depth);
         let (direction, shift) = (truth.direction, truth.in_key.1);
         Some(std::array::from_fn(|n| {
             let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
@@ -167,12 +170,14 @@ impl Trial<'_> {
         if z > 0.0 { inverse_depth / z } else { 0.0 }
     }
 
-    /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends.
-    pub fn between_ends_px(&self, probe: &Probe, truth: &Truth) -> f64 {
-        let [first, last] = [0.0, 1.0].map(|share| self.key_inverse_depth(probe, share));
+    /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends, and by the parabola through these and that of its middle.
+    pub fn between_px(&self, probe: &Probe, truth: &Truth) -> [f64; 2] {
+        let found @ [first, _, last] = [0.0, 0.5, 1.0].map(|share| self.key_inverse_depth(probe, share));
         let (direction, shift) = (truth.direction, truth.in_key.1);
-        let w = depth_on_line(direction, shift, first + (last - first) * truth.share).unwrap_or(0.0);
-        self.ideal.px_from_point(direction + w * shift).distance(truth.at_px)
+        [first + (last - first) * truth.share, through_three(found)(truth.share)].map(|between| {
+            let w = depth_on_line(direction, shift, between).unwrap_or(0.0);
+            self.ideal.px_from_point(direction + w * shift).distance(truth.at_px)
+        })
     }
 
     /// Instant at a share of the exposure, 0 to 1.
@@ -209,6 +214,33 @@ impl Trial<'_> {
     pub fn source_px(&self, probe: &Probe, truth: &Truth, share: f64) -> DVec2 {
         let (rotation, shift) = self.path.pose(self.instant_s(probe, share)).relative_to(self.key_pose);
         self.ideal.px_from_point(rotation * probe.uv.extend(1.0) + truth.inverse_depth * shift)
+    }
+
+    /// The places looked at: after no look-up, after one and so on, the first of which takes the key's inverse depth to be `guess`, or that of the plane. The same
+    /// steps as [`crate::temporal::reproject`].
+    fn settle(
+        &self,
+        uv: DVec2,
+        (rotation, shift): (DMat3, DVec3),
+        guess: Option<f64>,
+        depth: &mut KeyDepth<'_>,
+    ) -> [DVec2; MAX_LOOK_UPS + 1] {
+        let direction = rotation * uv.extend(1.0);
+        let mut w = match guess {
+            Some(guess) => depth_on_line(direction, shift, guess).unwrap_or(0.0),
+            None => plane_on_line(direction, shift, self.plane),
+        };
+        let mut at_px = self.ideal.px_from_point(direction + w * shift);
+        let mut last_px = DVec2::INFINITY;
+        std::array::from_fn(|n| {
+            // A place that gives itself again will do so for ever.
+            if n > 0 && at_px != last_px {
+                last_px = at_px;
+                w = depth_on_line(direction, shift, depth.inverse_depth(at_px)).unwrap_or(w);
+                at_px = self.ideal.px_from_point(direction + w * shift);
+            }
+            at_px
+        })
     }
 
     /// Directions from the key camera, towards an ideal pixel, z = 1 in the camera, NED.
@@ -261,30 +293,6 @@ impl Truth {
     pub fn is_hidden(&self) -> bool {
         self.seen.is_some_and(|seen| self.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
     }
-}
-
-/// The places looked at: after no look-up, after one and so on, the first of which takes the key's inverse depth to be `guess`. The same
-/// steps as [`crate::temporal::reproject`].
-fn settle(
-    uv: DVec2,
-    (rotation, shift): (DMat3, DVec3),
-    guess: f64,
-    ideal: &IdealGeometry,
-    depth: &mut KeyDepth<'_>,
-) -> [DVec2; MAX_LOOK_UPS + 1] {
-    let direction = rotation * uv.extend(1.0);
-    let mut w = depth_on_line(direction, shift, guess).unwrap_or(0.0);
-    let mut at_px = ideal.px_from_point(direction + w * shift);
-    let mut last_px = DVec2::INFINITY;
-    std::array::from_fn(|n| {
-        // A place that gives itself again will do so for ever.
-        if n > 0 && at_px != last_px {
-            last_px = at_px;
-            w = depth_on_line(direction, shift, depth.inverse_depth(at_px)).unwrap_or(w);
-            at_px = ideal.px_from_point(direction + w * shift);
-        }
-        at_px
-    })
 }
 
 /// As [`crate::temporal::reproject`]: `None` at or behind the line's own image plane.

@@ -8,10 +8,11 @@ mod map;
 
 use std::sync::OnceLock;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, TemporalStage,
+    BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, SeenPlane, TemporalStage,
     dry_run::{MAX_LOOK_UPS, Outcome, Trial, Truth},
     exposure::{MOST_STEPS, miss_px},
     holes,
@@ -53,7 +54,8 @@ const PHASES: [f64; 5] = [0.0, -0.5, 0.5, -0.309, 0.191];
 /// As many of them do for a mount at rest.
 const AT_REST: usize = 3;
 /// Phases at which one probe in [`BETWEEN_STEP`] tries what lies between the depths of the exposure's ends. Seen from mid-exposure the depths of a bent surface are missed
-/// by a parabola that is 0 at both ends, and the way from there is 0 in the middle: the product is largest here, at 0.5 / sqrt(3).
+/// by a parabola that is 0 at both ends, and the way from there is 0 in the middle: the product is largest here, at 0.5 / sqrt(3). So is what a parabola through three depths
+/// misses of a cubic.
 const BETWEEN: [f64; 2] = [-0.289, 0.289];
 const BETWEEN_STEP: usize = 2;
 /// Probes whose exposure is looked at.
@@ -112,16 +114,18 @@ impl Way {
     /// Beside what the reads themselves take, milliseconds.
     pub fn ms(self) -> f64 {
         let nodes = self.blur.map_or(1, |blur| blur.solved());
-        let looks = match self.blur.map(|blur| blur.depths) {
-            None | Some(NodeDepths::Mid) => 1,
-            Some(NodeDepths::Ends) => 2,
-            Some(NodeDepths::Each) => nodes,
+        let others = match self.blur.map(|blur| blur.depths) {
+            None | Some(NodeDepths::Mid) => 0,
+            Some(NodeDepths::Ends) => 1,
+            Some(NodeDepths::Three) => 2,
+            Some(NodeDepths::Each) => nodes - 1,
         };
         let poses = f64::from(nodes) * POSE_MS;
         match self.temporal {
             TemporalStage::Identity => 0.0,
             TemporalStage::Rotation | TemporalStage::Linear | TemporalStage::Rk2 => poses,
-            TemporalStage::Reproject { iterations } => poses + f64::from(iterations * looks) * LOOK_UP_MS,
+            // What begins with what another has found needs one less.
+            TemporalStage::Reproject { iterations } => poses + f64::from(iterations + others * (iterations.max(2) - 1)) * LOOK_UP_MS,
         }
     }
 }
@@ -172,12 +176,16 @@ impl<'a> Case<'a> {
             let blur = self.blur.map(|blur| BlurStage { depths, ..blur });
             (1..=MAX_LOOK_UPS as u32).map(move |iterations| Way { temporal: TemporalStage::Reproject { iterations }, blur })
         };
-        match self.blur {
-            // Two nodes are the ends.
-            Some(blur) if blur.solved() > 2 => ways.extend(NodeDepths::ALL.into_iter().flat_map(look_ups)),
-            Some(_) => ways.extend([NodeDepths::Mid, NodeDepths::Each].into_iter().flat_map(look_ups)),
-            None => ways.extend(look_ups(NodeDepths::Each)),
-        }
+        let depths: &[NodeDepths] = match self.blur.map(|blur| blur.solved()) {
+            None => &[NodeDepths::Each],
+            // Two nodes are the ends, three of them the middle too.
+            Some(0..=2) => &[NodeDepths::Mid, NodeDepths::Each],
+            Some(3) => &[NodeDepths::Mid, NodeDepths::Ends, NodeDepths::Each],
+            Some(_) => &NodeDepths::ALL,
+        };
+        let mut looking: Vec<Way> = depths.iter().copied().flat_map(look_ups).collect();
+        looking.sort_by(|a, b| a.ms().total_cmp(&b.ms()));
+        ways.extend(looking);
         ways
     }
 
@@ -208,8 +216,11 @@ impl<'a> Case<'a> {
             ideal: self.ideal,
             twist: self.asks_for_twist().then_some(self.key_twist),
             nearest_depth: self.sequence.scenario.quality.preset == Preset::Paper,
+            plane: DVec3::ZERO,
         };
-        Truths::new(self.reach, self.ray, trial, phases(&self.sequence.path, self.blur.is_some()), 1)
+        let mut truths = Truths::new(self.reach, self.ray, trial, phases(&self.sequence.path, self.blur.is_some()), 1);
+        truths.trial.plane = truths.plane().normal_per_m;
+        truths
     }
 }
 
@@ -302,6 +313,14 @@ impl<'a> Truths<'a> {
         apart as f64 / self.looked.len().max(1) as f64
     }
 
+    /// The plane that is nearest to what they see in the key frame.
+    pub fn plane(&self) -> SeenPlane {
+        let Trial { key_pose, ideal, .. } = self.trial;
+        let surfaces = self.looked.iter().filter(|looked| looked.truth.key_inverse_depth > 0.0);
+        let seen = |Looked { truth, .. }: &Looked| ((truth.at_px - ideal.principal_px) / ideal.focal_px, truth.key_inverse_depth);
+        SeenPlane::fitted(*key_pose, surfaces.map(seen))
+    }
+
     /// What `keys` do not see.
     pub fn holes(&self, keys: &[KeyFrame], max_error_px: f64) -> Holes {
         let looked = self.looked.par_iter().map(|Looked { probe, truth, .. }| (probe, truth));
@@ -319,11 +338,11 @@ impl<'a> Truths<'a> {
         holes::sky_strips(&self.trial, &looked, key, self.probe_px(), gain)
     }
 
-    /// Largest miss of what lies between the depths of the exposure's ends.
-    fn between_ends_px(&self) -> f64 {
-        let of = |looked: &Looked| self.trial.between_ends_px(&looked.probe, &looked.truth);
-        let px: Vec<f64> = self.looked.par_iter().with_min_len(16).map(of).collect();
-        self.largest(|i, _| px[i])
+    /// Largest miss of what lies between the depths of the exposure's ends, and between these and its middle.
+    fn between_px(&self) -> [f64; 2] {
+        let of = |looked: &Looked| self.trial.between_px(&looked.probe, &looked.truth);
+        let px: Vec<[f64; 2]> = self.looked.par_iter().with_min_len(16).map(of).collect();
+        [0, 1].map(|k: usize| self.largest(|i, _| px[i][k]))
     }
 
     fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
@@ -339,8 +358,8 @@ struct Forecast<'a> {
     detail: Option<&'a TerrainDetail<'a>>,
     /// One for each of the probes.
     outcomes: Vec<Outcome>,
-    /// [`Forecast::between_ends_px`], once it matters.
-    between_px: OnceLock<f64>,
+    /// [`Forecast::between_px`] of both, once it matters.
+    between_px: OnceLock<[f64; 2]>,
 }
 
 impl Forecast<'_> {
@@ -351,20 +370,25 @@ impl Forecast<'_> {
     /// Without the path between the exposure's nodes.
     pub fn total_px(&self, way: Way) -> f64 {
         let of_one = |looked: &Looked, run: &Outcome| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px();
-        self.largest(of_one) + SAFETY * self.between_ends_px(way)
+        self.largest(of_one) + SAFETY * self.between_px(way)
     }
 
-    /// Largest miss of nodes that take what lies between the depths of the exposure's ends.
-    fn between_ends_px(&self, way: Way) -> f64 {
-        let interpolates = way.blur.is_some_and(|blur| blur.depths == NodeDepths::Ends);
-        if !interpolates || !matches!(way.temporal, TemporalStage::Reproject { .. }) {
+    /// Largest miss of nodes that take what lies between the depths of others.
+    fn between_px(&self, way: Way) -> f64 {
+        let kind = match way.blur.map(|blur| blur.depths) {
+            Some(NodeDepths::Ends) => 0,
+            Some(NodeDepths::Three) => 1,
+            None | Some(NodeDepths::Mid | NodeDepths::Each) => return 0.0,
+        };
+        if !matches!(way.temporal, TemporalStage::Reproject { .. }) {
             return 0.0;
         }
-        *self.between_px.get_or_init(|| {
+        self.between_px.get_or_init(|| {
             let Truths { reach, ray, trial, .. } = *self.truths;
-            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP);
-            self.truths.between_ends_px().max(between.between_ends_px())
-        })
+            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP).between_px();
+            let at_phases = self.truths.between_px();
+            [0, 1].map(|k: usize| at_phases[k].max(between[k]))
+        })[kind]
     }
 
     /// The first way within the tolerance, or the best there is.
@@ -398,7 +422,7 @@ impl Forecast<'_> {
         let Expected { resampling_dn, blur_dn } = case.expected;
         let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
         let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
-        let temporal_px = SAFETY * (self.largest(|_, run| unsettled_px(run, way)) + self.between_ends_px(way));
+        let temporal_px = SAFETY * (self.largest(|_, run| unsettled_px(run, way)) + self.between_px(way));
         let depth_px = match stage {
             TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
@@ -482,7 +506,7 @@ fn error_px(run: &Outcome, way: Way) -> f64 {
             match way.blur.map(|blur| blur.depths) {
                 None => run.after[look_ups],
                 Some(NodeDepths::Mid) => run.of_mid[look_ups].max(run.after[look_ups]),
-                Some(NodeDepths::Ends | NodeDepths::Each) => run.handed_on[look_ups],
+                Some(NodeDepths::Ends | NodeDepths::Three | NodeDepths::Each) => run.handed_on[look_ups],
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::{BlurStage, EdgeStage, KeyFrame, LinearFog, Predicted, RayStage, SurfaceReads, TemporalStage};
+use super::{BlurStage, EdgeStage, KeyFrame, LinearFog, Predicted, RayStage, SeenPlane, SurfaceReads, TemporalStage};
 use crate::{
     camera::CameraModel,
     pose::CameraPose,
@@ -74,6 +74,8 @@ pub struct FramePlan {
     pub key_twist: Twist,
     /// Instants and poses of the ideal frames, in order of time.
     pub keys: Vec<KeyFrame>,
+    /// What look-ups of depth begin with.
+    pub plane: SeenPlane,
     /// First and last of the frames that are made from the same ideal frame; `None` where this frame has its own.
     pub shared_by: Option<[u64; 2]>,
     /// Why there is no other.

@@ -254,6 +254,7 @@ mod tests {
             ideal: &ideal,
             twist: None,
             nearest_depth: false,
+            plane: DVec3::ZERO,
         };
         Truths::of_silhouettes(&reach, trial).sky_strips(&key, &|_| gain)
     }

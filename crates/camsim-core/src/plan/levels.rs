@@ -206,8 +206,11 @@ impl Prospect<'_> {
             match tried.filter(|_| total_dn <= max_error_dn) {
                 None => failed.push((total_dn, sampling)),
                 Some(tried) => {
-                    let enough = self.with_fewer(&sampling, fewer, task, beside_dn).into_iter().chain([(total_dn, tried)]);
-                    let priced = enough.map(|(dn, sampling)| (price(cost(&way(sampling, sampling.samples_per_px)), dn), dn, sampling));
+                    let priced = |samples: f64, dn: f64| price(cost(&way(sampling, samples)), dn);
+                    // Fewer samples leave no less than the most.
+                    let cheaper = fewer.partition_point(|&samples| priced(samples, total_dn) < below);
+                    let enough = self.with_fewer(&sampling, &fewer[..cheaper], task, beside_dn).into_iter().chain([(total_dn, tried)]);
+                    let priced = enough.map(|(dn, sampling)| (priced(sampling.samples_per_px, dn), dn, sampling));
                     let found = priced.filter(|(price, ..)| *price < below).min_by(|a, b| a.0.total_cmp(&b.0));
                     cheapest = found.or(cheapest);
                 }

@@ -147,7 +147,18 @@ impl<'a> Look<'a> {
         }
         let &Self { stamp_s, key_s, ref key_pose, ref reach, .. } = self;
         let path = self.path();
-        let trial = dry_run::Trial { surfaces, path, shutter, stamp_s, key_s, key_pose, ideal, twist: None, nearest_depth: false };
+        let trial = dry_run::Trial {
+            surfaces,
+            path,
+            shutter,
+            stamp_s,
+            key_s,
+            key_pose,
+            ideal,
+            twist: None,
+            nearest_depth: false,
+            plane: glam::DVec3::ZERO,
+        };
         let truths = error::Truths::of_silhouettes(reach, trial);
         let gain = &prospect::gain(sequence, &reach.camera);
         let around =

@@ -61,13 +61,15 @@ pub enum NodeDepths {
     /// At both ends; what is between takes what lies between. The second look-up begins with what the first has found, and so takes one
     /// iteration less.
     Ends,
+    /// At mid-exposure and, beginning with what that has found, at both ends; what is between takes the parabola through them.
+    Three,
     /// In each, beginning with what the one before has found.
     Each,
 }
 
 impl NodeDepths {
     /// All of them, in the order of their time.
-    pub const ALL: [Self; 3] = [Self::Mid, Self::Ends, Self::Each];
+    pub const ALL: [Self; 4] = [Self::Mid, Self::Ends, Self::Three, Self::Each];
 }
 
 /// The curve that joins the nodes of an exposure: one polynomial of time through each so many of them, the last of which is the next one's

@@ -285,6 +285,7 @@ impl PipelineKey {
         let nodes = match (self.temporal, self.depths) {
             (TemporalKind::Reproject, NodeDepths::Mid) => "reverse/gather/nodes/mid.wgsl",
             (TemporalKind::Reproject, NodeDepths::Ends) => "reverse/gather/nodes/ends.wgsl",
+            (TemporalKind::Reproject, NodeDepths::Three) => "reverse/gather/nodes/three.wgsl",
             (TemporalKind::Reproject, NodeDepths::Each) => "reverse/gather/nodes/each.wgsl",
             _ => "reverse/gather/nodes/solved.wgsl",
         };
@@ -375,6 +376,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 8072);
+        assert_eq!(PipelineKey::all().len(), 10_232);
     }
 }

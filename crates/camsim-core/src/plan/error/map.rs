@@ -96,11 +96,12 @@ impl Planner {
             ideal: &ideal,
             twist: is_of_twist(way.temporal).then_some(plan.key_twist),
             nearest_depth: plan.preset == Preset::Paper,
+            plane: plan.plane.seen_from(&key_pose),
         };
         let truths = Truths::new(&reach, plan.ray, trial, super::phases(&self.sequence.path, plan.blur.is_some()), 1);
         let detail = super::terrain_detail(&self.sequence, &key_pose, &ideal, plan.terrain_error_px);
         let forecast = truths.forecast(detail.as_ref());
-        let everywhere_px = SAFETY * forecast.between_ends_px(way) + forecast.nodes_px(way.blur);
+        let everywhere_px = SAFETY * forecast.between_px(way) + forecast.nodes_px(way.blur);
         let known = truths.looked.par_iter().zip(&forecast.outcomes).with_min_len(16).map(|(looked, run)| {
             let px = SAFETY * error_px(run, way) + forecast.rounding(looked, run, way.temporal).total_px();
             let error = if truths.is_apart(looked) { PlaceError::Silhouette } else { PlaceError::Within(px) };
