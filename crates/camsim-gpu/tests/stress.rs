@@ -223,6 +223,8 @@ fn no_time_shift_is_the_identity() {
     let flying = steady(60.0, 0.0, DVec3::new(80.0, 20.0, 30.0), DVec3::new(0.5, -0.7, 2.0));
     let mut scenario = small(rolling(0.0, 0.0), -60.0);
     scenario.quality.max_error_px = 1e-4;
+    // Each from an ideal frame of its own: over a plane they would share one.
+    scenario.quality.frames_per_ideal = 1;
     let sequence = sequence(scenario, flying, pattern(6000.0));
     let done = check("no time shift", &sequence, GROUND, 1e-4);
     assert_eq!(done.plan.temporal, TemporalStage::Identity);

@@ -69,8 +69,6 @@ pub(super) struct Outcome {
     pub still_px: f64,
     /// After n depth look-ups; none: each line's rotation alone.
     pub after: [f64; MAX_LOOK_UPS + 1],
-    /// With the depth that n look-ups find at mid-exposure.
-    pub of_mid: [f64; MAX_LOOK_UPS + 1],
     /// After n look-ups, or n - 1 and at least one where they begin with the depth that the other end of the exposure finds.
     pub handed_on: [f64; MAX_LOOK_UPS + 1],
     /// The part of `after` that more look-ups would mend.
@@ -80,6 +78,8 @@ pub(super) struct Outcome {
     pub rk2_px: f64,
     /// Displacement by parallax.
     pub parallax_px: f64,
+    /// The key frame's inverse depth of what the probe meets at the end of its exposure that is farther from its instant, 1/m.
+    pub elsewhere: f64,
 }
 
 /// The key frame's depth, texel by texel, found when asked for.
@@ -127,12 +127,11 @@ impl Trial<'_> {
         let places = self.settle(probe.uv, truth.in_key, None, &mut depth);
         outcome.after = places.map(off);
         outcome.after[0] = outcome.parallax_px;
-        let elsewhere = self.key_inverse_depth(probe, if truth.share > 0.5 { 0.0 } else { 1.0 });
-        let begun_there = self.settle(probe.uv, truth.in_key, Some(elsewhere), &mut depth).map(off);
+        outcome.elsewhere = self.key_inverse_depth(probe, truth, truth.far_end());
+        let begun_there = self.settle(probe.uv, truth.in_key, Some(outcome.elsewhere), &mut depth).map(off);
         outcome.handed_on = std::array::from_fn(|n| begun_there[n.saturating_sub(1).max(1)].max(outcome.after[n]));
         let settled_px = places[MAX_LOOK_UPS];
         outcome.unsettled = places.map(|at_px| at_px.distance(settled_px));
-        outcome.of_mid = self.with_depth_of_mid(probe, truth, &mut depth).map_or(outcome.after, |places| places.map(off));
         if let Some(twist) = &self.twist {
             let dt_s = truth.t_s - self.key_s;
             let w = depth.along(if self.nearest_depth { own_px.round() } else { own_px });
@@ -146,23 +145,34 @@ impl Trial<'_> {
         outcome
     }
 
-    /// The places looked at with the depth that n look-ups find at mid-exposure; `None` if it is that.
-    fn with_depth_of_mid(&self, probe: &Probe, truth: &Truth, depth: &mut KeyDepth<'_>) -> Option<[DVec2; MAX_LOOK_UPS + 1]> {
+    /// How far from the truth a probe looks with the depth that n look-ups find at mid-exposure; `None` if it is that.
+    pub fn of_mid(&self, probe: &Probe, truth: &Truth, detail: Option<&TerrainDetail<'_>>) -> Option<[f64; MAX_LOOK_UPS + 1]> {
         let mid_s = self.instant_s(probe, 0.5);
         if truth.t_s == mid_s {
             return None;
         }
-        let looked_at = self.settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), None, depth);
+        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(8) };
+        let looked_at = self.settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), None, &mut depth);
         let (direction, shift) = (truth.direction, truth.in_key.1);
         Some(std::array::from_fn(|n| {
             let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
-            self.ideal.px_from_point(direction + w.unwrap_or(0.0) * shift)
+            self.off_px(truth, direction + w.unwrap_or(0.0) * shift)
         }))
     }
 
+    /// How far from the truth a place is, given in the key camera.
+    fn off_px(&self, truth: &Truth, in_key: DVec3) -> f64 {
+        let at_px = self.ideal.px_from_point(in_key);
+        if at_px.is_finite() { at_px.distance(truth.at_px) } else { f64::INFINITY }
+    }
+
     /// The key frame's inverse depth of what a probe's ray meets at a share of the exposure, 1/m; 0 = sky.
-    fn key_inverse_depth(&self, probe: &Probe, share: f64) -> f64 {
-        let pose = self.path.pose(self.instant_s(probe, share));
+    fn key_inverse_depth(&self, probe: &Probe, truth: &Truth, share: f64) -> f64 {
+        let t_s = self.instant_s(probe, share);
+        if t_s == truth.t_s {
+            return truth.key_inverse_depth;
+        }
+        let pose = self.path.pose(t_s);
         let met = self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * probe.uv.extend(1.0));
         let inverse_depth = met.map_or(0.0, |met| 1.0 / met.depth_m);
         let (rotation, shift) = pose.relative_to(self.key_pose);
@@ -171,12 +181,16 @@ impl Trial<'_> {
     }
 
     /// How far a node looks from the truth that takes what lies between the depths of the exposure's ends, and by the parabola through these and that of its middle.
-    pub fn between_px(&self, probe: &Probe, truth: &Truth) -> [f64; 2] {
-        let found @ [first, _, last] = [0.0, 0.5, 1.0].map(|share| self.key_inverse_depth(probe, share));
+    /// `elsewhere` is [`Outcome::elsewhere`], if that is known.
+    pub fn between_px(&self, probe: &Probe, truth: &Truth, elsewhere: Option<f64>) -> [f64; 2] {
+        let found @ [first, _, last] = [0.0, 0.5, 1.0].map(|share| match elsewhere {
+            Some(known) if share == truth.far_end() => known,
+            _ => self.key_inverse_depth(probe, truth, share),
+        });
         let (direction, shift) = (truth.direction, truth.in_key.1);
         [first + (last - first) * truth.share, through_three(found)(truth.share)].map(|between| {
             let w = depth_on_line(direction, shift, between).unwrap_or(0.0);
-            self.ideal.px_from_point(direction + w * shift).distance(truth.at_px)
+            self.off_px(truth, direction + w * shift)
         })
     }
 
@@ -290,6 +304,11 @@ impl Trial<'_> {
 }
 
 impl Truth {
+    /// Share of the exposure gone by at its end that is farther away.
+    fn far_end(&self) -> f64 {
+        if self.share > 0.5 { 0.0 } else { 1.0 }
+    }
+
     pub fn is_hidden(&self) -> bool {
         self.seen.is_some_and(|seen| self.key_inverse_depth * seen.depth_m < 1.0 - HIDDEN)
     }

@@ -58,6 +58,8 @@ const AT_REST: usize = 3;
 /// misses of a cubic.
 const BETWEEN: [f64; 2] = [-0.289, 0.289];
 const BETWEEN_STEP: usize = 2;
+/// One probe in so many is asked first whether the depth of mid-exposure does for all of it; not in step with the grid, and with phases in turn.
+const MID_STEP: usize = 7;
 /// Probes whose exposure is looked at.
 const MISS_PROBES: usize = 32;
 /// Polynomials of the path looked at for each of them.
@@ -111,6 +113,16 @@ const POSE_MS: f64 = 0.8;
 const LOOK_UP_MS: f64 = 1.2;
 
 impl Way {
+    /// Look-ups of depth, if those at mid-exposure are all that there are.
+    fn look_ups_of_mid(self) -> Option<usize> {
+        match self {
+            Self { temporal: TemporalStage::Reproject { iterations }, blur: Some(BlurStage { depths: NodeDepths::Mid, .. }) } => {
+                Some((iterations as usize).min(MAX_LOOK_UPS))
+            }
+            _ => None,
+        }
+    }
+
     /// Beside what the reads themselves take, milliseconds.
     pub fn ms(self) -> f64 {
         let nodes = self.blur.map_or(1, |blur| blur.solved());
@@ -338,17 +350,24 @@ impl<'a> Truths<'a> {
         holes::sky_strips(&self.trial, &looked, key, self.probe_px(), gain)
     }
 
-    /// Largest miss of what lies between the depths of the exposure's ends, and between these and its middle.
-    fn between_px(&self) -> [f64; 2] {
-        let of = |looked: &Looked| self.trial.between_px(&looked.probe, &looked.truth);
-        let px: Vec<[f64; 2]> = self.looked.par_iter().with_min_len(16).map(of).collect();
+    /// Largest miss of what lies between the depths of the exposure's ends, and between these and its middle. `elsewhere` is [`Outcome::elsewhere`] of each, if that is known.
+    fn between_px(&self, elsewhere: impl Fn(usize) -> Option<f64> + Sync) -> [f64; 2] {
+        let of = |(i, looked): (usize, &Looked)| self.trial.between_px(&looked.probe, &looked.truth, elsewhere(i));
+        let px: Vec<[f64; 2]> = self.looked.par_iter().enumerate().with_min_len(16).map(of).collect();
         [0, 1].map(|k: usize| self.largest(|i, _| px[i][k]))
     }
 
     fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
         let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
-        Forecast { outcomes, detail, truths: self, between_px: OnceLock::new() }
+        Forecast {
+            outcomes,
+            detail,
+            truths: self,
+            between_px: OnceLock::new(),
+            of_mid: OnceLock::new(),
+            of_mid_here_and_there: OnceLock::new(),
+        }
     }
 }
 
@@ -360,17 +379,62 @@ struct Forecast<'a> {
     outcomes: Vec<Outcome>,
     /// [`Forecast::between_px`] of both, once it matters.
     between_px: OnceLock<[f64; 2]>,
+    /// With the depth that look-ups find at mid-exposure, of each of the probes, and of one in [`MID_STEP`]: once it matters.
+    of_mid: OnceLock<Vec<OfMid>>,
+    of_mid_here_and_there: OnceLock<Vec<OfMid>>,
 }
 
+/// Error after n look-ups, ideal pixels.
+type OfMid = [f64; MAX_LOOK_UPS + 1];
+
 impl Forecast<'_> {
-    fn largest(&self, of: impl Fn(&Looked, &Outcome) -> f64) -> f64 {
-        self.truths.largest(|i, looked| of(looked, &self.outcomes[i]))
+    fn largest(&self, of: impl Fn(usize, &Looked, &Outcome) -> f64) -> f64 {
+        self.truths.largest(|i, looked| of(i, looked, &self.outcomes[i]))
     }
 
     /// Without the path between the exposure's nodes.
     pub fn total_px(&self, way: Way) -> f64 {
-        let of_one = |looked: &Looked, run: &Outcome| SAFETY * error_px(run, way) + self.rounding(looked, run, way.temporal).total_px();
+        let of_one =
+            |i, looked: &Looked, run: &Outcome| SAFETY * self.error_px(i, way) + self.rounding(looked, run, way.temporal).total_px();
         self.largest(of_one) + SAFETY * self.between_px(way)
+    }
+
+    /// Error of a way at a probe.
+    fn error_px(&self, i: usize, way: Way) -> f64 {
+        let run = &self.outcomes[i];
+        match way.look_ups_of_mid() {
+            Some(look_ups) => self.of_mid()[i][look_ups].max(run.after[look_ups]),
+            None => error_px(run, way),
+        }
+    }
+
+    /// The part of it that a better temporal inverse would mend.
+    fn unsettled_px(&self, i: usize, way: Way) -> f64 {
+        match way.temporal {
+            TemporalStage::Reproject { iterations } if way.look_ups_of_mid().is_none() => {
+                self.outcomes[i].unsettled[(iterations as usize).min(MAX_LOOK_UPS)]
+            }
+            _ => self.error_px(i, way),
+        }
+    }
+
+    fn of_mid(&self) -> &[OfMid] {
+        self.of_mid.get_or_init(|| self.of_mid_of(1))
+    }
+
+    /// Of one probe in `step`.
+    fn of_mid_of(&self, step: usize) -> Vec<OfMid> {
+        let Truths { trial, looked, .. } = self.truths;
+        let of = |(looked, run): (&Looked, &Outcome)| trial.of_mid(&looked.probe, &looked.truth, self.detail).unwrap_or(run.after);
+        looked.par_iter().zip(&self.outcomes).step_by(step).with_min_len(16).map(of).collect()
+    }
+
+    /// Whether a few probes tell already that a way misses by more than this.
+    fn surely_misses(&self, way: Way, px: f64) -> bool {
+        let Some(look_ups) = way.look_ups_of_mid() else { return false };
+        let known = self.of_mid_here_and_there.get_or_init(|| self.of_mid_of(MID_STEP));
+        let of_few = |i: usize| if i.is_multiple_of(MID_STEP) { known[i / MID_STEP][look_ups] } else { 0.0 };
+        SAFETY * self.largest(|i, _, _| of_few(i)) > px
     }
 
     /// Largest miss of nodes that take what lies between the depths of others.
@@ -385,14 +449,24 @@ impl Forecast<'_> {
         }
         self.between_px.get_or_init(|| {
             let Truths { reach, ray, trial, .. } = *self.truths;
-            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP).between_px();
-            let at_phases = self.truths.between_px();
+            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP).between_px(|_| None);
+            let at_phases = self.truths.between_px(|i| Some(self.outcomes[i].elsewhere));
             [0, 1].map(|k: usize| at_phases[k].max(between[k]))
         })[kind]
     }
 
     /// The first way within the tolerance, or the best there is.
     pub fn choose(&self, tolerance_px: f64, ways: Vec<Way>) -> Way {
+        // What a few probes rule out is looked at more closely only if nothing else keeps the tolerance.
+        let (ruled_out, in_question): (Vec<Way>, Vec<Way>) = ways.iter().copied().partition(|way| self.surely_misses(*way, tolerance_px));
+        match self.first_within(tolerance_px, in_question) {
+            Err(_) if !ruled_out.is_empty() => self.first_within(tolerance_px, ways).unwrap_or_else(|best| best),
+            Ok(way) | Err(way) => way,
+        }
+    }
+
+    /// The first way within the tolerance; or else the best there is.
+    fn first_within(&self, tolerance_px: f64, ways: Vec<Way>) -> Result<Way, Way> {
         let mut best: Option<(f64, Way)> = None;
         let mut known_nodes: Vec<((u32, u32, bool), f64)> = Vec::new();
         for way in ways {
@@ -404,14 +478,14 @@ impl Forecast<'_> {
             });
             let total_px = self.total_px(way) + nodes_px;
             if total_px <= tolerance_px {
-                return way;
+                return Ok(way);
             }
             // What gains less than a twentieth is not worth its time.
             if best.is_none_or(|(px, _)| total_px < 0.95 * px) {
                 best = Some((total_px, way));
             }
         }
-        best.map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way)
+        Err(best.map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way))
     }
 
     /// The errors of a stage by cause.
@@ -420,11 +494,11 @@ impl Forecast<'_> {
         let nodes_px = self.nodes_px(blur);
         let total_px = self.total_px(way) + nodes_px;
         let Expected { resampling_dn, blur_dn } = case.expected;
-        let lens_px = self.largest(|looked, run| self.rounding(looked, run, stage).lens_px);
-        let format_px = self.largest(|looked, run| self.rounding(looked, run, stage).format_px);
-        let temporal_px = SAFETY * (self.largest(|_, run| unsettled_px(run, way)) + self.between_px(way));
+        let lens_px = self.largest(|_, looked, run| self.rounding(looked, run, stage).lens_px);
+        let format_px = self.largest(|_, looked, run| self.rounding(looked, run, stage).format_px);
+        let temporal_px = SAFETY * (self.largest(|i, _, _| self.unsettled_px(i, way)) + self.between_px(way));
         let depth_px = match stage {
-            TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, run| run.after[MAX_LOOK_UPS]),
+            TemporalStage::Reproject { .. } => SAFETY * self.largest(|_, _, run| run.after[MAX_LOOK_UPS]),
             _ => 0.0,
         };
         let (probes, tried) = (self.outcomes.len(), case.reach.probes.len());
@@ -494,7 +568,7 @@ impl Forecast<'_> {
     }
 }
 
-/// Error of a way at a probe.
+/// Error at a probe of a way that takes no depth of mid-exposure elsewhere.
 fn error_px(run: &Outcome, way: Way) -> f64 {
     match way.temporal {
         TemporalStage::Identity => run.still_px,
@@ -503,21 +577,7 @@ fn error_px(run: &Outcome, way: Way) -> f64 {
         TemporalStage::Rk2 => run.rk2_px,
         TemporalStage::Reproject { iterations } => {
             let look_ups = (iterations as usize).min(MAX_LOOK_UPS);
-            match way.blur.map(|blur| blur.depths) {
-                None => run.after[look_ups],
-                Some(NodeDepths::Mid) => run.of_mid[look_ups].max(run.after[look_ups]),
-                Some(NodeDepths::Ends | NodeDepths::Three | NodeDepths::Each) => run.handed_on[look_ups],
-            }
+            if way.blur.is_some() { run.handed_on[look_ups] } else { run.after[look_ups] }
         }
-    }
-}
-
-/// The part of it that a better temporal inverse would mend.
-fn unsettled_px(run: &Outcome, way: Way) -> f64 {
-    match way {
-        Way { temporal: TemporalStage::Reproject { iterations }, blur } if !blur.is_some_and(|blur| blur.depths == NodeDepths::Mid) => {
-            run.unsettled[(iterations as usize).min(MAX_LOOK_UPS)]
-        }
-        _ => error_px(run, way),
     }
 }

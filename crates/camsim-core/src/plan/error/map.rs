@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{SAFETY, Trial, Truths, Way, error_px};
+use super::{SAFETY, Trial, Truths, Way};
 use crate::{
     plan::{
         FramePlan, PlanError, Planner, TemporalStage,
@@ -102,8 +102,8 @@ impl Planner {
         let detail = super::terrain_detail(&self.sequence, &key_pose, &ideal, plan.terrain_error_px);
         let forecast = truths.forecast(detail.as_ref());
         let everywhere_px = SAFETY * forecast.between_px(way) + forecast.nodes_px(way.blur);
-        let known = truths.looked.par_iter().zip(&forecast.outcomes).with_min_len(16).map(|(looked, run)| {
-            let px = SAFETY * error_px(run, way) + forecast.rounding(looked, run, way.temporal).total_px();
+        let known = truths.looked.par_iter().zip(&forecast.outcomes).enumerate().with_min_len(16).map(|(i, (looked, run))| {
+            let px = SAFETY * forecast.error_px(i, way) + forecast.rounding(looked, run, way.temporal).total_px();
             let error = if truths.is_apart(looked) { PlaceError::Silhouette } else { PlaceError::Within(px) };
             (looked.number, error)
         });

@@ -28,8 +28,9 @@ impl Terrain {
     /// length. Rays cannot slip through between triangles.
     pub fn intersect(&self, origin_ned_m: DVec3, direction_ned: DVec3, t_max: f64) -> Option<TerrainHit> {
         let mut best: Option<TerrainHit> = None;
+        let beside = direction_ned.normalize().any_orthonormal_pair();
         self.tree.walk(origin_ned_m, direction_ned, t_max, &mut |block, limit| {
-            let hit = self.intersect_block(block, origin_ned_m, direction_ned, limit);
+            let hit = self.intersect_block(block, origin_ned_m, direction_ned, beside, limit);
             best = hit.or(best);
             hit.map_or(limit, |hit| hit.t)
         });
@@ -81,13 +82,19 @@ impl Terrain {
         nearest
     }
 
-    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point of a plane, and a cell all of
-    /// whose vertices lie to one side of the ray there is missed.
-    fn intersect_block(&self, block: [u32; 2], origin: DVec3, direction: DVec3, t_max: f64) -> Option<TerrainHit> {
+    /// The cells of a block that a ray may pass are found first: seen along the ray every vertex is a point of a plane, whose axes are `right` and `up`, and a
+    /// cell all of whose vertices lie to one side of the ray there is missed.
+    fn intersect_block(
+        &self,
+        block: [u32; 2],
+        origin: DVec3,
+        direction: DVec3,
+        (right, up): (DVec3, DVec3),
+        t_max: f64,
+    ) -> Option<TerrainHit> {
         let (chunk_index, [i0, j0]) = self.chunk_of_cell(block.map(|n| n * BLOCK_CELLS));
         let chunk = &self.chunks[chunk_index as usize];
         let [columns, rows] = [(i0, chunk.cells[0]), (j0, chunk.cells[1])].map(|(first, cells)| BLOCK_CELLS.min(cells - first) as usize);
-        let (right, up) = direction.normalize().any_orthonormal_pair();
         let centre_m = chunk.centre_ned_m - origin;
         let mut beside = [[DVec2::NAN; SIDE]; SIDE];
         for (j, row) in (j0..).zip(beside.iter_mut().take(rows + 1)) {
