@@ -76,11 +76,5 @@ fn version_for(cell: f32) -> Version {
 
 #import <slot:reads>
 
-// Linear light that arrives from a place of that colour.
-fn in_fog(color: vec3<f32>, in_camera_m: vec3<f32>) -> vec4<f32> {
-    if (ideal_camera.sky.w > 0.0) {
-        let fog = 1.0 - exp(-ideal_camera.sky.w * length(in_camera_m));
-        return vec4<f32>(mix(color, ideal_camera.sky.rgb, fog), 1.0);
-    }
-    return vec4<f32>(color, 1.0);
-}
+// What arrives from a place of a colour: a slot, since a condition would cost what it leaves out.
+#import <slot:fog>

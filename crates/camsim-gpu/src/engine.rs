@@ -123,7 +123,7 @@ impl Engine {
         self.check_output(&planner)?;
         let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let preset = sequence.scenario.quality.preset;
-        let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some())?;
+        let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some(), sequence.scene.fog_visibility_m)?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
         let session = Session {
             vignette: vignette_buffer(gpu, &sequence),

@@ -38,7 +38,8 @@ pub(crate) use marks::spread_slot;
 use near_marks::NearMarksPass;
 use pipelines::{SurfaceKey, SurfacePipelines};
 #[cfg(test)]
-pub(crate) use pipelines::{mesh_slots, picture_slot, reads_slot};
+#[cfg(test)]
+pub(crate) use pipelines::{ground_slots, mesh_slots};
 use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
@@ -131,6 +132,8 @@ pub struct IdealPass {
     color_format: wgpu::TextureFormat,
     /// Whether the ground's picture is in tiles.
     has_tiles: bool,
+    /// Whether the ideal frame has the scene's fog.
+    has_fog: bool,
 }
 
 /// What frames with silhouettes take besides drawing.
@@ -168,7 +171,7 @@ impl IdealPass {
     ///
     /// # Errors
     /// Faults of the shader files.
-    pub fn new(gpu: &GpuContext, preset: Preset, has_tiles: bool) -> Result<Self, ComposeError> {
+    pub fn new(gpu: &GpuContext, preset: Preset, has_tiles: bool, fog_visibility_m: Option<f64>) -> Result<Self, ComposeError> {
         let device = &gpu.device;
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
@@ -196,6 +199,8 @@ impl IdealPass {
             pipelines: HashMap::new(),
             color_format: color_format(preset),
             has_tiles,
+            // The paper's fog comes after the gather.
+            has_fog: fog_visibility_m.is_some() && preset != Preset::Paper,
         })
     }
 

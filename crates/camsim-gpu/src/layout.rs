@@ -214,11 +214,7 @@ mod tests {
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
         let module = parse(
-            shaders::compose(
-                "ideal/terrain.wgsl",
-                &[crate::ideal::reads_slot(camsim_core::plan::SurfaceReads::Grid), crate::ideal::picture_slot(true)],
-            )
-            .unwrap(),
+            shaders::compose("ideal/terrain.wgsl", &crate::ideal::ground_slots(camsim_core::plan::SurfaceReads::Grid, true, true)).unwrap(),
         );
         assert_mirror!(
             &module,
@@ -238,7 +234,7 @@ mod tests {
                 pad2,
             ]
         );
-        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, false);
+        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, false, true);
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);

@@ -20,6 +20,8 @@ embedded![
     "ideal/borders.wgsl",
     "ideal/camera.wgsl",
     "ideal/fine.wgsl",
+    "ideal/fog/none.wgsl",
+    "ideal/fog/some.wgsl",
     "ideal/holes.wgsl",
     "ideal/light.wgsl",
     "ideal/lines.wgsl",

@@ -22,9 +22,10 @@ fn samples_for(length_px: f32, at_least: u32) -> u32 {
 fn mean_along(curve: Curve, count: u32, area: Footprint, first_tap: u32) -> vec4<f32> {
     var sum = vec4<f32>(0.0);
     let reads = reads_of(area, count);
+    let step = f32(STEPS) / f32(count);
     for (var i = 0u; i < reads; i++) {
         let sample = sample_of(area, i);
-        sum += tap_color(area, along(curve, f32(STEPS) * (f32(sample) + 0.5) / f32(count)), first_tap + sample, i);
+        sum += tap_color(area, along(curve, step * (f32(sample) + 0.5)), first_tap + sample, i);
     }
     return sum / f32(count);
 }

@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// What fills the surfaces' slot.
-pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
+fn reads_slot(reads: SurfaceReads) -> Slot {
     let file = match reads {
         SurfaceReads::One => "ideal/reads/one.wgsl",
         SurfaceReads::Two => "ideal/reads/two.wgsl",
@@ -27,17 +27,26 @@ pub(crate) fn reads_slot(reads: SurfaceReads) -> Slot {
 }
 
 /// What fills the slot of the surface's picture.
-pub(crate) fn picture_slot(has_tiles: bool) -> Slot {
+fn picture_slot(has_tiles: bool) -> Slot {
     ("picture", if has_tiles { "ideal/picture/tiles.wgsl" } else { "ideal/picture/whole.wgsl" })
 }
 
+fn fog_slot(has_fog: bool) -> Slot {
+    ("fog", if has_fog { "ideal/fog/some.wgsl" } else { "ideal/fog/none.wgsl" })
+}
+
+/// What fills the slots of the ground.
+pub(crate) fn ground_slots(reads: SurfaceReads, has_tiles: bool, has_fog: bool) -> [Slot; 3] {
+    [reads_slot(reads), picture_slot(has_tiles), fog_slot(has_fog)]
+}
+
 /// What fills the slots of a mesh.
-pub(crate) fn mesh_slots(reads: SurfaceReads, mixed: bool) -> [Slot; 3] {
+pub(crate) fn mesh_slots(reads: SurfaceReads, mixed: bool, has_fog: bool) -> [Slot; 4] {
     let (picture, color) = match mixed {
         false => (picture_slot(false), ("mesh_color", "ideal/mesh_color/whole.wgsl")),
         true => (("picture", "ideal/picture/mixed.wgsl"), ("mesh_color", "ideal/mesh_color/mixed.wgsl")),
     };
-    [reads_slot(reads), picture, color]
+    [reads_slot(reads), picture, color, fog_slot(has_fog)]
 }
 
 /// Which pipelines draw surfaces.
@@ -84,7 +93,7 @@ impl IdealPass {
             SurfaceKey::FineDepth => (SurfaceReads::One, FINE_SAMPLES, None),
             SurfaceKey::Fine(reads) => (reads, FINE_SAMPLES, Some(COLOR_FORMAT)),
         };
-        let of_ground = [reads_slot(reads), picture_slot(self.has_tiles)];
+        let of_ground = ground_slots(reads, self.has_tiles, self.has_fog);
         let ground = [&self.camera_layout, &self.terrain_layout];
         let on_ground = Drawing { samples, color: format, ..Drawing::default() };
         let terrain = pipeline(gpu, "ideal/terrain.wgsl", &of_ground, &ground, &[], on_ground)?;
@@ -97,7 +106,7 @@ impl IdealPass {
             let drawing = Drawing { one_sided: kind.one_sided, holes: kind.holes, ..on_ground };
             let vertices = [Some(mesh_vertices.clone()), Some(mesh_normals.clone())];
             let all = if kind.lit { &vertices[..] } else { &vertices[..1] };
-            let slots = mesh_slots(reads, false);
+            let slots = mesh_slots(reads, false, self.has_fog);
             if !kind.blends {
                 meshes.insert(*kind, pipeline(gpu, kind.shader(), &slots, &layouts, all, drawing)?);
                 continue;
@@ -106,7 +115,7 @@ impl IdealPass {
             meshes.insert(*kind, pipeline(gpu, "ideal/mesh_holes.wgsl", &slots, &layouts, &vertices[..1], depth)?);
             if format.is_some() {
                 let mixed = Drawing { writes: Writes::Mixed, ..drawing };
-                layers.insert(*kind, pipeline(gpu, kind.shader(), &mesh_slots(reads, true), &layouts, all, mixed)?);
+                layers.insert(*kind, pipeline(gpu, kind.shader(), &mesh_slots(reads, true, self.has_fog), &layouts, all, mixed)?);
             }
         }
         Ok(SurfacePipelines { terrain, meshes, layers })

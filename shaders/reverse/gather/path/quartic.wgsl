@@ -33,6 +33,6 @@ fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
 // Place after so many steps.
 fn along(curve: Curve, steps: f32) -> vec2<f32> {
     let third = curve.d3 + 0.25 * (steps - 3.0) * curve.d4;
-    let second = curve.d2 + (steps - 2.0) / 3.0 * third;
+    let second = curve.d2 + (steps - 2.0) * (1.0 / 3.0) * third;
     return curve.begin_px + steps * (curve.d1 + 0.5 * (steps - 1.0) * second);
 }
