@@ -7,8 +7,8 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     noise::tail_table,
     photometric::{photometric, vignette_weights},
-    plan::{NodeDepths, RayStage, TemporalStage, line_poses},
-    scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, ZoomSpec},
+    plan::{BlurStage, NodeDepths, RayStage, TemporalStage, line_poses},
+    scenario::{Auto, Axis, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec, ZoomSpec},
     sequence::{GrayImage, Sequence},
     temporal::{
         ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyView, Source, TapStage, gather, reproject, reproject_nodes,
@@ -83,12 +83,22 @@ fn footprint(map: &[[f32; 2]], size_px: [u32; 2], [x, y]: [u32; 2], ideal: &Idea
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn temporal_inverse_and_gather_agree_with_their_twins() {
     // Tolerances that ask for depth at mid-exposure, at its ends, at all three for five nodes, and in each of three.
-    let depths = [0.5, 0.001, 1e-5, 3e-4].map(gather_as_its_twin);
+    let depths = [0.5, 0.001, 1e-5, 3e-4].map(|max_error_px| gather_as_its_twin(max_error_px, None).depths);
     assert_eq!(depths, NodeDepths::ALL);
 }
 
-fn gather_as_its_twin(max_error_px: f64) -> NodeDepths {
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn paths_of_one_two_and_more_polynomials_agree_with_their_twins() {
+    let stretches = [5.0, 40.0, 90.0].map(|hz| gather_as_its_twin(0.05, Some(hz)).stretches());
+    assert!(stretches[0] == 1 && stretches[1] == 2 && stretches[2] > 2, "{stretches:?}");
+}
+
+/// Of a mount that shakes so often.
+fn gather_as_its_twin(max_error_px: f64, hz: Option<f64>) -> BlurStage {
     let mut scenario = moving_scenario();
+    let shake = |hz| VibrationSpec { axis: Axis::Pitch, amplitude_deg: 0.3, amplitude_m: 0.0, hz, phase_deg: 20.0 };
+    scenario.camera.mount.vibration = hz.map(shake).into_iter().collect();
     scenario.quality.max_error_px = max_error_px;
     scenario.quality.solver = Auto::Value(Solver::Reproject);
     let sequence = sequence(scenario, steady(120.0, 30.0, EAST, TURN), pattern(6000.0));
@@ -139,14 +149,16 @@ fn gather_as_its_twin(max_error_px: f64) -> NodeDepths {
         }
     }
     eprintln!(
-        "{:?}, {} nodes: temporal {worst_px:.2e} px, depth {worst_depth:.2e}; gather: {differing} of {compared} pixels beyond 1e-3",
-        blur.depths, blur.nodes
+        "{:?}, {} nodes, {} polynomials: temporal {worst_px:.2e} px, depth {worst_depth:.2e}; gather: {differing} of {compared} pixels beyond 1e-3",
+        blur.depths,
+        blur.solved(),
+        blur.stretches()
     );
     assert!(compared > 20_000, "{compared}");
     // f32 of coordinates up to 400 px: 3e-5 px a rounding.
     assert!(worst_px < 5e-4 && worst_depth < 1e-4, "{worst_px:.2e} {worst_depth:.2e}");
     assert!(differing * 100 < compared, "{differing} of {compared}");
-    blur.depths
+    blur
 }
 
 #[test]

@@ -8,9 +8,9 @@
 #import <slot:stretches>
 #import <slot:line>
 
-// The node k steps of the path after another one.
-fn node_after(pixel: vec2<u32>, ray: Ray, node: u32, k: u32) -> Source {
-    return next_node(ray, node + k * frame.node_stride, pose_of_step(pixel, node, k));
+// The node so many steps of the path after the first.
+fn node_at(pixel: vec2<u32>, ray: Ray, step: u32) -> Source {
+    return next_node(ray, step * frame.node_stride, pose_of_step(pixel, step));
 }
 
 fn samples_for(length_px: f32, at_least: u32) -> u32 {

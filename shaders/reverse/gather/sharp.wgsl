@@ -4,6 +4,7 @@
 
 // Steps of the path over the exposure.
 const STEPS: u32 = 0u;
+const STRETCHES: u32 = 1u;
 
 fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let source = temporal_inverse(ray.uv, pose_of_mid(pixel));

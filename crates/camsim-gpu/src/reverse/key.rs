@@ -95,6 +95,29 @@ impl Looks {
     }
 }
 
+/// Polynomials of an exposure's path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stretches {
+    /// One.
+    One,
+    /// Two.
+    Two,
+    /// As many as the plan says.
+    Several,
+}
+
+impl Stretches {
+    const ALL: [Self; 3] = [Self::One, Self::Two, Self::Several];
+
+    fn of(count: u32) -> Self {
+        match count {
+            1 => Self::One,
+            2 => Self::Two,
+            _ => Self::Several,
+        }
+    }
+}
+
 /// Which stages a kernel is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PipelineKey {
@@ -110,8 +133,8 @@ pub struct PipelineKey {
     pub depths: NodeDepths,
     /// What joins them.
     pub path: PathStage,
-    /// One polynomial joins all of them.
-    pub one_stretch: bool,
+    /// How many polynomials join all of them.
+    pub stretches: Stretches,
     /// What reads the ideal frame.
     pub tap: TapKind,
     /// What the ideal frames are of.
@@ -142,7 +165,10 @@ impl PipelineKey {
             blur: plan.blur.is_some(),
             depths: plan.blur.map_or(NodeDepths::Each, |blur| blur.depths),
             path: plan.blur.map_or(PathStage::Straight, |blur| blur.path),
-            one_stretch: plan.preset != Preset::Paper && plan.blur.is_some_and(|blur| blur.stretches() == 1),
+            stretches: plan
+                .blur
+                .filter(|_| plan.preset != Preset::Paper)
+                .map_or(Stretches::Several, |blur| Stretches::of(blur.stretches())),
             tap: plan.taps.into(),
             keys: match temporal {
                 _ if plan.keys.len() > 1 => KeyKind::Several,
@@ -186,9 +212,9 @@ impl PipelineKey {
                             for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid, TapKind::SplineOrGrid] {
                                 let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
                                 let looks: &[Looks] = if parallax { &Looks::ALL } else { &[Looks::Several] };
-                                let stretches: &[bool] = if blur { &[false, true] } else { &[false] };
-                                let loops = looks.iter().flat_map(|&looks| stretches.iter().map(move |&one_stretch| (looks, one_stretch)));
-                                keys.extend(loops.flat_map(|(looks, one_stretch)| {
+                                let stretches: &[Stretches] = if blur { &Stretches::ALL } else { &[Stretches::Several] };
+                                let loops = looks.iter().flat_map(|&looks| stretches.iter().map(move |&stretches| (looks, stretches)));
+                                keys.extend(loops.flat_map(|(looks, stretches)| {
                                     truths.iter().map(move |&truth| Self {
                                         ray,
                                         temporal,
@@ -196,7 +222,7 @@ impl PipelineKey {
                                         blur,
                                         depths,
                                         path,
-                                        one_stretch,
+                                        stretches,
                                         tap,
                                         keys: key_kind,
                                         edges,
@@ -219,7 +245,7 @@ impl PipelineKey {
                     blur,
                     depths: NodeDepths::Each,
                     path: PathStage::Straight,
-                    one_stretch: false,
+                    stretches: Stretches::Several,
                     tap: TapKind::Bilinear,
                     keys: KeyKind::Single,
                     edges: EdgeKind::None,
@@ -234,7 +260,7 @@ impl PipelineKey {
     /// Whether the poses of a line are few enough to be held while a thread goes along it.
     #[must_use]
     pub fn holds_line(&self) -> bool {
-        self.keys != KeyKind::Several && !self.paper && (self.one_stretch || !self.blur)
+        self.keys != KeyKind::Several && !self.paper && (self.stretches != Stretches::Several || !self.blur)
     }
 
     /// Fillings of the kernel's slots.
@@ -294,7 +320,11 @@ impl PipelineKey {
             PathStage::Parabola => "reverse/gather/path/parabola.wgsl",
             PathStage::Quartic => "reverse/gather/path/quartic.wgsl",
         };
-        let stretches = if self.one_stretch { "reverse/gather/stretches/one.wgsl" } else { "reverse/gather/stretches/several.wgsl" };
+        let stretches = match self.stretches {
+            Stretches::One => "reverse/gather/stretches/one.wgsl",
+            Stretches::Two => "reverse/gather/stretches/two.wgsl",
+            Stretches::Several => "reverse/gather/stretches/several.wgsl",
+        };
         let (line, pixels) = match self.holds_line() {
             true => ("reverse/line/held.wgsl", "reverse/pixels/several.wgsl"),
             false => ("reverse/line/read.wgsl", "reverse/pixels/one.wgsl"),
@@ -337,7 +367,7 @@ mod tests {
     fn every_variant_is_valid_without_any_capability() {
         // What fills `looks` and `stretches` knows nothing of lens map and taps: written out, one of each will do.
         let is_told_apart = |key: &PipelineKey| {
-            let loops = key.looks == Looks::Several && !key.one_stretch;
+            let loops = key.looks == Looks::Several && key.stretches == Stretches::Several;
             loops || key.ray == RayStage::LensMap && key.tap == TapKind::Spline
         };
         let texts = PipelineKey::all().into_iter().filter(is_told_apart).flat_map(|key| {
@@ -376,6 +406,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 10_232);
+        assert_eq!(PipelineKey::all().len(), 15_056);
     }
 }

@@ -3,7 +3,7 @@
 var<private> found_depth: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
-    let pose = pose_of_step(pixel, 0u, 0u);
+    let pose = pose_of_step(pixel, 0u);
     found_depth = settled_inverse_depth(ray.uv, pose);
     return source_of_depth(ray.uv, pose, found_depth);
 }

@@ -6,11 +6,11 @@ var<private> depth_bend: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
     let middle = settled_inverse_depth(ray.uv, pose_of_mid(pixel));
-    begin_depth = settled_inverse_depth_from(middle, ray.uv, pose_of_step(pixel, 0u, 0u));
+    begin_depth = settled_inverse_depth_from(middle, ray.uv, pose_of_step(pixel, 0u));
     let end = settled_inverse_depth_from(middle, ray.uv, pose_of_end(pixel));
     depth_slope = 4.0 * middle - 3.0 * begin_depth - end;
     depth_bend = 2.0 * begin_depth + 2.0 * end - 4.0 * middle;
-    return next_node(ray, 0u, pose_of_step(pixel, 0u, 0u));
+    return next_node(ray, 0u, pose_of_step(pixel, 0u));
 }
 
 fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {

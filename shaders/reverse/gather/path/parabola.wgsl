@@ -10,10 +10,10 @@ struct Curve {
     end: Source,
 }
 
-// From a node on, that of number `node`.
-fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let middle = node_after(pixel, ray, node, 1u);
-    let end = node_after(pixel, ray, node, 2u);
+// From a node on, so many steps after the first.
+fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, step: u32) -> Curve {
+    let middle = node_at(pixel, ray, step + 1u);
+    let end = node_at(pixel, ray, step + 2u);
     let d1 = middle.at_px - begin.at_px;
     let last = end.at_px - middle.at_px;
     return Curve(begin.at_px, d1, last - d1, length(d1) + length(last), begin.inside && middle.inside && end.inside, end);

@@ -12,12 +12,12 @@ struct Curve {
     end: Source,
 }
 
-// From a node on, that of number `node`.
-fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let a = node_after(pixel, ray, node, 1u);
-    let b = node_after(pixel, ray, node, 2u);
-    let c = node_after(pixel, ray, node, 3u);
-    let end = node_after(pixel, ray, node, 4u);
+// From a node on, so many steps after the first.
+fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, step: u32) -> Curve {
+    let a = node_at(pixel, ray, step + 1u);
+    let b = node_at(pixel, ray, step + 2u);
+    let c = node_at(pixel, ray, step + 3u);
+    let end = node_at(pixel, ray, step + 4u);
     // First differences of neighbours, then those of them, and so on.
     let p = a.at_px - begin.at_px;
     let q = b.at_px - a.at_px;

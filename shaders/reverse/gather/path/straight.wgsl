@@ -9,9 +9,9 @@ struct Curve {
     end: Source,
 }
 
-// From a node on, that of number `node`.
-fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, node: u32) -> Curve {
-    let end = node_after(pixel, ray, node, 1u);
+// From a node on, so many steps after the first.
+fn curve_from(begin: Source, pixel: vec2<u32>, ray: Ray, step: u32) -> Curve {
+    let end = node_at(pixel, ray, step + 1u);
     let d1 = end.at_px - begin.at_px;
     return Curve(begin.at_px, d1, length(d1), begin.inside && end.inside, end);
 }

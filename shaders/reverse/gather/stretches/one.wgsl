@@ -1,4 +1,6 @@
 // One polynomial joins all nodes: no loop, which on llvmpipe costs more than its body.
+const STRETCHES: u32 = 1u;
+
 fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     let area = footprint(ray);
     let source = first_node(pixel, ray);

@@ -1,12 +1,6 @@
 // Several polynomials, one after the other.
-
-// Steps of the pose table along one of them, and how many there are.
-fn nodes_of_stretch() -> u32 {
-    return STEPS * frame.node_stride;
-}
-
 fn stretch_count() -> u32 {
-    return told((frame.nodes - 1u) / nodes_of_stretch());
+    return told((frame.nodes - 1u) / (STEPS * frame.node_stride));
 }
 
 fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
@@ -19,7 +13,7 @@ fn gather(pixel: vec2<u32>, ray: Ray) -> Gathered {
     var source = first_node(pixel, ray);
     let first_far_px = source.far_px;
     for (var k = 0u; k < stretches; k++) {
-        let curve = curve_from(source, pixel, ray, k * nodes_of_stretch());
+        let curve = curve_from(source, pixel, ray, k * STEPS);
         inside = inside && curve.inside;
         let count = samples_for(curve.length_px, at_least);
         sum += mean_along(curve, count, area, tap);
@@ -38,7 +32,7 @@ fn source_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> Source {
     let k = min(u32(gone), stretch_count() - 1u);
     var curve = curve_from(first_node(pixel, ray), pixel, ray, 0u);
     for (var i = 1u; i <= k; i++) {
-        curve = curve_from(curve.end, pixel, ray, i * nodes_of_stretch());
+        curve = curve_from(curve.end, pixel, ray, i * STEPS);
     }
     var source = curve.end;
     source.at_px = along(curve, f32(STEPS) * (gone - f32(k)));
