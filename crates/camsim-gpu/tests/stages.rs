@@ -8,7 +8,9 @@ use camsim_core::{
     noise::tail_table,
     photometric::{photometric, vignette_weights},
     plan::{BlurStage, NodeDepths, RayStage, TemporalStage, line_poses},
-    scenario::{Auto, Axis, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec, ZoomSpec},
+    scenario::{
+        Auto, Axis, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec, ZoomSpec,
+    },
     sequence::{GrayImage, Sequence},
     temporal::{
         ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyView, Source, TapStage, gather, reproject, reproject_nodes,
