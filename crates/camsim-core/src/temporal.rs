@@ -342,6 +342,15 @@ mod tests {
     }
 
     #[test]
+    fn a_parabola_goes_through_its_three() {
+        let parabola = |share: f64| 3.0 - 2.0 * share + 0.7 * share * share;
+        let through = through_three([0.0, 0.5, 1.0].map(parabola));
+        for share in [0.0, 0.2, 0.5, 0.85, 1.0] {
+            assert!((through(share) - parabola(share)).abs() < 1e-14, "{share}");
+        }
+    }
+
+    #[test]
     fn reprojection_over_a_plane_is_its_homography() {
         let ideal = IdealGeometry { size_px: [200, 150], focal_px: DVec2::splat(150.0), principal_px: DVec2::new(99.5, 74.5) };
         let normal = DVec3::new(0.002, -0.003, 0.02);
