@@ -168,7 +168,8 @@ fn places(levels: usize) -> Vec<(f64, f64, Vec<f64>)> {
 /// What the mean of `count` texels leaves of a wave, `cycles` a texel: `sin(pi n f) / (n sin(pi f))`.
 pub(super) fn mean_of(count: u32, cycles: f64) -> f64 {
     let (n, one) = (f64::from(count), sin_pi(cycles));
-    if one.abs() < 1e-6 { 1.0 } else { sin_pi(n * cycles) / (n * one) }
+    // At whole numbers both sines vanish.
+    if one.abs() < 1e-6 { sin_pi((n - 1.0) * cycles + 0.5) } else { sin_pi(n * cycles) / (n * one) }
 }
 
 /// A piece of a picture in linear light.

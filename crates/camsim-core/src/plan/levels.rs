@@ -10,7 +10,7 @@
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, FramePlan, SurfaceReads,
+    BlurStage, SurfaceReads,
     costs::Price,
     exposure::ExposurePath,
     picture::Picture,
@@ -343,12 +343,6 @@ impl Sampling {
     /// Of which nothing is expected yet.
     pub fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
         Self { scale, surface_reads, taps, samples_per_px: 0.0, expected: Expected::default() }
-    }
-
-    /// A plan's.
-    pub fn of(plan: &FramePlan) -> Self {
-        let scale = plan.ideal.focal_px.x / plan.camera.focal_px.x;
-        Self { samples_per_px: plan.blur.map_or(0.0, |blur| blur.samples_per_px), ..Self::new(scale, plan.surface_reads, plan.taps) }
     }
 
     /// The paper's: one bilinear read a sample.

@@ -72,6 +72,11 @@ impl Planner {
 }
 
 impl<'a> Look<'a> {
+    /// The same, asked for something else.
+    pub fn asking(self, asked: sharing::Asked) -> Self {
+        Self { asked, ..self }
+    }
+
     pub fn is_paper(&self) -> bool {
         self.planner.sequence.scenario.quality.preset == Preset::Paper
     }

@@ -22,13 +22,28 @@ pub(super) struct Picture {
     pub is_plain: bool,
     pub fine: u32,
     pub price: Price,
+    /// RMS error over the picture as far as that is expected, 1/255 of the linear range.
+    pub total_dn: f64,
+}
+
+impl Picture {
+    fn of(choice: &Choice, silhouettes: Option<Contours>, is_plain: bool, fine: u32) -> Self {
+        Self { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price, total_dn: choice.total_dn }
+    }
 }
 
 impl Look<'_> {
     /// The cheapest picture within `quality.max_error_dn`, or the best there is.
     pub fn picture(&self, scenery: &Scenery<'_>) -> Picture {
         if self.is_paper() {
-            return Picture { sampling: Sampling::of_paper(), silhouettes: None, is_plain: true, fine: 1, price: Price::default() };
+            return Picture {
+                sampling: Sampling::of_paper(),
+                silhouettes: None,
+                is_plain: true,
+                fine: 1,
+                price: Price::default(),
+                total_dn: 0.0,
+            };
         }
         let quality = &self.planner.sequence.scenario.quality;
         let max_error_dn = quality.max_error_dn * self.asked.share_of_dn;
@@ -46,7 +61,7 @@ impl Look<'_> {
         let Some(outlook) = outlook else {
             let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
-            return Picture { sampling: choice.sampling, silhouettes: None, is_plain: false, fine: 1, price: choice.price };
+            return Picture::of(&choice, None, false, 1);
         };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
@@ -87,7 +102,7 @@ impl Look<'_> {
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
         let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine) });
-        Picture { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price }
+        Picture::of(&choice, silhouettes, is_plain, fine)
     }
 
     /// Scale from which on the ideal frame is too large.

@@ -22,8 +22,8 @@ use crate::scenario::{Auto, Preset, Silhouettes};
 const WORTH: f64 = 0.1;
 /// Largest ideal frame for several, in pixels of one for a single frame.
 const MOST_AREA: f64 = 4.0;
-/// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it.
-const SHARES: [f64; 3] = [1.0, 1.0, 0.85];
+/// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it. Neighbours differ by a few percent.
+const SHARES: [f64; 3] = [0.95, 1.0, 0.85];
 /// From so many frames on the halves of a group are tried each for itself.
 const FAR: u64 = 8;
 
@@ -62,8 +62,8 @@ impl<'a> Candidates<'a> {
         Self { planner, common, seen: common.frames.clone().map(|_| OnceLock::new()).collect() }
     }
 
-    /// The plan of a frame from the common ideal frame; `None` where silhouettes would cost too much, and for a fault.
-    fn plan(&self, frame: u64, asked: Asked) -> Option<FramePlan> {
+    /// What a frame sees from the common ideal frame; `None` where silhouettes would cost too much with such a sampling, and for a fault.
+    fn see(&self, frame: u64, given: Option<Sampling>) -> Option<(Look<'a>, &Scenery<'a>)> {
         let place = self.seen.get((frame - self.common.frames.start) as usize)?;
         let see = || {
             let look = self.planner.look(frame, Some(self.common)).ok()?;
@@ -71,33 +71,50 @@ impl<'a> Candidates<'a> {
             Some((look, scenery))
         };
         let (look, scenery) = place.get_or_init(see).as_ref()?;
-        let scale = asked.given.map_or(FINEST_SCALE, |sampling| sampling.scale);
-        if !scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale) {
-            return None;
-        }
-        self.planner.plan_of(&Look { asked, ..look.clone() }, scenery).ok()
+        let scale = given.map_or(FINEST_SCALE, |sampling| sampling.scale);
+        scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale).then(|| (look.clone(), scenery))
     }
 
-    /// `planned` and the others, sampled as it is and in order, as far as it takes to tell which of them are sampled too coarsely: the outermost are looked at first,
-    /// what does for them mostly does for those between. `None` where one does not keep `quality.max_error_px`.
-    fn plan_others(&self, planned: FramePlan, own: &FramePlan) -> Option<Vec<FramePlan>> {
+    /// How a frame would be sampled by itself, for a part of `quality.max_error_dn`.
+    fn sampling(&self, frame: u64, share_of_dn: f64) -> Option<Sampling> {
+        let (look, scenery) = self.see(frame, None)?;
+        Some(look.asking(Asked { share_of_dn, given: None }).picture(scenery).sampling)
+    }
+
+    /// The plan of a frame that is sampled so.
+    fn plan(&self, frame: u64, sampling: Sampling) -> Option<FramePlan> {
+        let (look, scenery) = self.see(frame, Some(sampling))?;
+        self.planner.plan_of(&look.asking(Asked { given: Some(sampling), ..Asked::default() }), scenery).ok()
+    }
+
+    /// The frame that is sampled most too coarsely so, by its picture alone. `Err` where one may not be sampled so at all.
+    fn too_coarse(&self, sampling: Sampling, own: &FramePlan) -> Result<Option<u64>, CannotShare> {
+        let asked = Asked { given: Some(sampling), ..Asked::default() };
+        let picture_dn = |frame: u64| {
+            let (look, scenery) = self.see(frame, Some(sampling)).ok_or(CannotShare)?;
+            Ok((frame, look.asking(asked).picture(scenery).total_dn))
+        };
+        let all: Vec<(u64, f64)> = self.common.frames.clone().into_par_iter().map(picture_dn).collect::<Result<_, _>>()?;
+        let most_dn =
+            if own.predicted.levels_kept { self.planner.sequence.scenario.quality.max_error_dn } else { own.predicted.picture_dn() };
+        let worst = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(worst.filter(|(_, dn)| *dn > most_dn).map(|(frame, _)| frame))
+    }
+
+    /// The plans of all, in order, sampled as the plan of the first is; `None` where one of them does not keep `quality.max_error_px`.
+    fn plan_others(&self, first: FramePlan, sampling: Sampling, own: &FramePlan) -> Option<Vec<FramePlan>> {
         let frames = &self.common.frames;
-        let asked = Asked { given: Some(Sampling::of(&planned)), ..Asked::default() };
-        let plan = |frame: u64| self.plan(frame, asked).filter(|plan| keeps_px(plan, own));
-        let done = planned.frame;
-        let mut plans = vec![planned];
-        for outermost in [frames.start, frames.end - 1].into_iter().filter(|&frame| frame != done) {
-            plans.push(plan(outermost)?);
-            if plans.iter().any(|plan| !keeps_dn(plan, own)) {
-                return Some(plans);
-            }
-        }
-        let between: Vec<u64> = (frames.start + 1..frames.end - 1).filter(|&frame| frame != done).collect();
-        plans.extend(between.into_par_iter().map(plan).collect::<Option<Vec<_>>>()?);
-        plans.sort_by_key(|plan| plan.frame);
-        Some(plans)
+        let plan = |frame: u64| self.plan(frame, sampling).filter(|plan| keeps_px(plan, own));
+        // What does for the outermost mostly does for those between.
+        let last = plan(frames.end - 1)?;
+        let between: Vec<u64> = (frames.start + 1..frames.end - 1).collect();
+        let between = between.into_par_iter().map(plan).collect::<Option<Vec<_>>>()?;
+        Some(std::iter::once(first).chain(between).chain([last]).collect())
     }
 }
+
+/// Frames that are better not made from one ideal frame.
+struct CannotShare;
 
 impl Common {
     /// Output frames made from it.
@@ -216,19 +233,19 @@ impl Planner {
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
-            let plan = candidates.plan(coarsest, Asked { share_of_dn, given: None });
-            let plan = plan.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
-            if !keeps_dn(&plan, own) {
-                return None;
-            }
-            let plans = candidates.plan_others(plan, own)?;
-            let too_coarse = plans
-                .iter()
-                .filter(|plan| !keeps_dn(plan, own))
-                .max_by(|a, b| a.predicted.picture_dn().total_cmp(&b.predicted.picture_dn()));
-            match too_coarse {
-                Some(plan) => coarsest = plan.frame,
-                None => return is_worth_it(plans.iter().map(|plan| plan.price_ms).sum(), common.count()).then(|| together(plans)),
+            let sampling = candidates.sampling(coarsest, share_of_dn)?;
+            let first = candidates.plan(frames.start, sampling);
+            let first = first.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
+            let by_pictures = candidates.too_coarse(sampling, own).ok()?;
+            let plans = if by_pictures.is_none() { Some(candidates.plan_others(first, sampling, own)?) } else { None };
+            match by_pictures.or_else(|| most_wrong(plans.as_ref()?, own)) {
+                // Nothing that was tried does for it.
+                Some(frame) if frame == coarsest => return None,
+                Some(frame) => coarsest = frame,
+                None => {
+                    let price = |plans: &[FramePlan]| plans.iter().map(|plan| plan.price_ms).sum();
+                    return plans.filter(|plans| is_worth_it(price(plans), common.count())).map(together);
+                }
             }
         }
         None
@@ -257,10 +274,14 @@ fn keeps_px(plan: &FramePlan, own: &FramePlan) -> bool {
     !plan.edges.has_rays() && (here.kept || !there.kept && here.total_px <= NEARLY * there.total_px)
 }
 
-/// The same of `quality.max_error_dn`.
-fn keeps_dn(plan: &FramePlan, own: &FramePlan) -> bool {
-    let (here, there) = (&plan.predicted, &own.predicted);
-    here.levels_kept || !there.levels_kept && here.picture_dn() <= there.picture_dn()
+/// The frame that is farthest from keeping `quality.max_error_dn`, or from coming as near as one from its own ideal frame does; `None` if all do.
+fn most_wrong(plans: &[FramePlan], own: &FramePlan) -> Option<u64> {
+    let keeps = |plan: &FramePlan| {
+        let (here, there) = (&plan.predicted, &own.predicted);
+        here.levels_kept || !there.levels_kept && here.picture_dn() <= there.picture_dn()
+    };
+    let wrong = plans.iter().filter(|plan| !keeps(plan));
+    wrong.max_by(|a, b| a.predicted.picture_dn().total_cmp(&b.predicted.picture_dn())).map(|plan| plan.frame)
 }
 
 /// Plans from one ideal frame: what that is made by is the strictest of all.

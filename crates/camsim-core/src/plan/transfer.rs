@@ -11,23 +11,17 @@
 //! | grid of reads, samples on a path | `sin(pi n x) / (n sin(pi x))` of the step along each |
 //! | exact: mean over the pixel's sides and the path | `sinc` of each |
 
-use std::f64::consts::{LN_2, PI};
+mod lanes;
+mod waves;
 
-use glam::{DMat2, DVec2};
+use std::f64::consts::PI;
 
-use super::{
-    grain::{Spectrum, mean_of},
-    surface_filter::SurfaceFilter,
-};
+use glam::DVec2;
+
+use super::grain::mean_of;
 use crate::{scenario::MAX_FOOTPRINT_TAPS, temporal::Footprint};
+pub(super) use waves::{Waves, error2};
 
-/// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
-const LOWEST: f64 = 0.062_5;
-const OCTAVES: u32 = 6;
-const AN_OCTAVE: u32 = 2;
-const DIRECTIONS: u32 = 6;
-/// Cycles a texel above which a bilinear texture has no more to show.
-const MOST_CYCLES: f64 = 1.5;
 /// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of the wave.
 const UNSEEN: f64 = 1e-3;
 /// Taps along a side that the plan asks for by itself, at most.
@@ -164,52 +158,6 @@ fn aliases(softness: Option<f64>, f: f64, beside_px: f64) -> [Alias; 3] {
     })
 }
 
-/// Waves of a texture that a pixel sees.
-#[derive(Debug)]
-pub(super) struct Waves(Vec<Seen>);
-
-#[derive(Debug)]
-struct Seen {
-    /// Cycles an ideal pixel, and cycles a texel.
-    f: DVec2,
-    cycles: DVec2,
-    power: f64,
-    /// What the exact mean leaves.
-    exact: f64,
-}
-
-impl Waves {
-    /// `sides`: of the pixel, ideal px; `along`: the path over the exposure, if that shows.
-    pub fn new(spectrum: &Spectrum, texel_from_ideal: DMat2, sides: DMat2, along: Option<DVec2>) -> Self {
-        let per_texel = texel_from_ideal.determinant().abs().recip();
-        let texel_cycles = texel_from_ideal.inverse().transpose();
-        let wave = |(i, j): (u32, u32)| {
-            let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
-            // Of a half-plane: the other half is its mirror image.
-            let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
-            let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
-            let cycles = texel_cycles * f;
-            if cycles.abs().max_element() > MOST_CYCLES {
-                return None;
-            }
-            let power = weight * per_texel * spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
-            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * along.map_or(1.0, |along| sinc(along.dot(f)));
-            Some(Seen { f, cycles, power, exact })
-        };
-        Self((0..OCTAVES * AN_OCTAVE).flat_map(|i| (0..DIRECTIONS).map(move |j| (i, j))).filter_map(wave).collect())
-    }
-
-    /// What the filter of the surfaces leaves of each.
-    pub fn filtered(&self, filter: &SurfaceFilter) -> Vec<f64> {
-        self.0.iter().map(|wave| filter.leaves(wave.cycles)).collect()
-    }
-
-    /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
-    pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
-        self.0.iter().map(|wave| read_wave(wave.f, area, over, beside_px)).collect()
-    }
-}
-
 /// What reads are taken over.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Over {
@@ -240,19 +188,10 @@ pub(super) fn read_wave(f: DVec2, area: &Footprint, over: Over, beside_px: DVec2
     seen.map(of).sum()
 }
 
-/// Expected squared error of a pixel, of the linear range.
-pub(super) fn error2(waves: &Waves, filtered: &[f64], read: &[Wave]) -> f64 {
-    let parts = waves.0.iter().zip(filtered).zip(read);
-    parts.map(|((wave, &ideal), &read)| wave.power * (ideal * read - Wave::new(wave.exact, 0.0)).length_squared()).sum()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        plan::SurfaceReads,
-        temporal::{ColorImage, TapStage},
-    };
+    use crate::temporal::ColorImage;
 
     /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.
     fn measured(f: DVec2, softness: Option<f64>, at: DVec2, exact: f64) -> f64 {
@@ -333,20 +272,5 @@ mod tests {
                 assert!(sampled(&area, path, f).distance(each) < 1e-9, "{samples} samples, {f}");
             }
         }
-    }
-
-    #[test]
-    fn an_aligned_pixel_reads_nothing_between_pixels_and_one_beside_does() {
-        let spectrum = Spectrum::flat(-2.0);
-        let filter = SurfaceFilter::new(DMat2::IDENTITY, SurfaceReads::Grid);
-        let error = |stage, beside_px| {
-            let area = Footprint::new(DVec2::X, DVec2::Y, stage);
-            let waves = Waves::new(&spectrum, DMat2::IDENTITY, DMat2::IDENTITY, None);
-            error2(&waves, &waves.filtered(&filter), &waves.read(&area, Over::Instant, beside_px))
-        };
-        let half = DVec2::splat(0.5);
-        assert!(error(TapStage::Bilinear, half) > 2.0 * error(TapStage::Bilinear, DVec2::ZERO));
-        assert!(error(TapStage::Bilinear, half) > 1.5 * error(TapStage::Spline, half));
-        assert!(error(TapStage::Spline, half) > 2.0 * error(TapStage::Spline, DVec2::ZERO));
     }
 }

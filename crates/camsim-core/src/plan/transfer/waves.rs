@@ -1,0 +1,214 @@
+//! The waves of a texture that stand for all of them, and what is left of each. Their frequencies in the ideal frame are always the same, and so is what a
+//! single read leaves of each and of those that look like it: `TABLE`.
+
+use std::{
+    f64::consts::{LN_2, PI},
+    sync::LazyLock,
+};
+
+use glam::{DMat2, DVec2, Vec4};
+
+use super::{
+    Footprint, Over, UNSEEN, Wave, catmull_rom,
+    lanes::{Frequencies4, Sampler},
+    sinc, turned_by,
+};
+use crate::plan::{grain::Spectrum, surface_filter::SurfaceFilter};
+
+/// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
+const LOWEST: f64 = 0.062_5;
+const OCTAVES: u32 = 6;
+const AN_OCTAVE: u32 = 2;
+const DIRECTIONS: u32 = 6;
+/// Whole cycles that may lie between the highest of them and what it looks like, and one more.
+const MOST_AWAY: usize = 5;
+/// Cycles a texel above which a bilinear texture has no more to show.
+const MOST_CYCLES: f64 = 1.5;
+
+static TABLE: LazyLock<Vec<Known>> = LazyLock::new(|| {
+    let all = (0..OCTAVES * AN_OCTAVE).flat_map(|i| (0..DIRECTIONS).map(move |j| [i, j]));
+    all.map(Known::new).collect()
+});
+
+/// What is known of a wave before anything is of the texture.
+struct Known {
+    /// Cycles an ideal pixel.
+    f: DVec2,
+    /// Square cycles that it stands for.
+    weight: f64,
+    /// Along each axis the wave and the slowest two that look like it.
+    aliases: [[Alias; 3]; 2],
+}
+
+/// One axis of a wave that looks like another on the grid of ideal pixels.
+struct Alias {
+    /// Whole cycles between the two, and what is left.
+    away: i32,
+    seen: f64,
+    /// What reads leave of it: a bilinear one, and the two kernels that a spline is mixed of.
+    bilinear: f64,
+    sharp: f64,
+    soft: f64,
+}
+
+impl Known {
+    fn new([i, j]: [u32; 2]) -> Self {
+        let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
+        let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
+        // Of a half-plane: the other half is its mirror image.
+        let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
+        Self { f, weight, aliases: [0, 1].map(|k| [-1, 0, 1].map(|step| Alias::new(f[k], step))) }
+    }
+}
+
+impl Alias {
+    fn new(f: f64, step: i32) -> Self {
+        let away = step - f.round() as i32;
+        let seen = f + f64::from(away);
+        Self { away, seen, bilinear: sinc(seen).powi(2), sharp: catmull_rom(seen), soft: sinc(seen).powi(4) }
+    }
+
+    /// What a read leaves of it; softness as of [`Footprint::spline`].
+    fn read(&self, softness: Option<f64>) -> f64 {
+        softness.map_or(self.bilinear, |soft| self.sharp + soft * (self.soft - self.sharp))
+    }
+}
+
+/// Waves of a texture that a pixel sees.
+#[derive(Debug)]
+pub(in crate::plan) struct Waves(Vec<Seen>);
+
+#[derive(Debug)]
+struct Seen {
+    /// Its place in the table.
+    index: usize,
+    /// Cycles a texel.
+    cycles: DVec2,
+    power: f64,
+    /// What the exact mean leaves.
+    exact: f64,
+}
+
+/// A read of one wave or of what looks like it.
+struct Read {
+    /// Which of the waves.
+    of: usize,
+    /// Cycles an ideal pixel.
+    f: DVec2,
+    leaves: Wave,
+}
+
+impl Waves {
+    /// `sides`: of the pixel, ideal px; `along`: the path over the exposure, if that shows.
+    pub fn new(spectrum: &Spectrum, texel_from_ideal: DMat2, sides: DMat2, along: Option<DVec2>) -> Self {
+        let per_texel = texel_from_ideal.determinant().abs().recip();
+        let texel_cycles = texel_from_ideal.inverse().transpose();
+        let wave = |(index, known): (usize, &Known)| {
+            let (f, cycles) = (known.f, texel_cycles * known.f);
+            if cycles.abs().max_element() > MOST_CYCLES {
+                return None;
+            }
+            let power = known.weight * per_texel * spectrum.density_at(cycles) * (sinc(cycles.x) * sinc(cycles.y)).powi(4);
+            let exact = sinc(sides.x_axis.dot(f)) * sinc(sides.y_axis.dot(f)) * along.map_or(1.0, |along| sinc(along.dot(f)));
+            Some(Seen { index, cycles, power, exact })
+        };
+        Self(TABLE.iter().enumerate().filter_map(wave).collect())
+    }
+
+    /// What the filter of the surfaces leaves of each.
+    pub fn filtered(&self, filter: &SurfaceFilter) -> Vec<f64> {
+        self.0.iter().map(|wave| filter.leaves(wave.cycles)).collect()
+    }
+
+    /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
+    pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
+        let reads = self.reads(area, beside_px);
+        let sampler = Sampler::new(area, over);
+        let mut left = vec![Wave::ZERO; self.0.len()];
+        for four in reads.chunks(4) {
+            let of_four = |value: &dyn Fn(&Read) -> f64| Vec4::from_array(std::array::from_fn(|i| four.get(i).map_or(0.0, value) as f32));
+            let sampled = sampler.leaves(Frequencies4 { x: of_four(&|read| read.f.x), y: of_four(&|read| read.f.y) });
+            for (i, read) in four.iter().enumerate() {
+                left[read.of] += read.leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
+            }
+        }
+        left
+    }
+
+    /// A single read of each, and of what looks like it, as far as that counts.
+    fn reads(&self, area: &Footprint, beside_px: DVec2) -> Vec<Read> {
+        // Turns of whole cycles by the place of the read.
+        let turns =
+            |beside_px: f64| -> [Wave; 2 * MOST_AWAY + 1] { std::array::from_fn(|i| turned_by((i as f64 - MOST_AWAY as f64) * beside_px)) };
+        let turns = [turns(beside_px.x), turns(beside_px.y)];
+        let turn = |k: usize, away: i32| turns[k][(away + MOST_AWAY as i32) as usize];
+        let mut reads = Vec::with_capacity(5 * self.0.len());
+        for (of, wave) in self.0.iter().enumerate() {
+            let [along_x, along_y] = &TABLE[wave.index].aliases;
+            for x in along_x {
+                let by_x = x.read(area.spline.map(|softness| softness.x));
+                for y in along_y {
+                    let by_both = by_x * y.read(area.spline.map(|softness| softness.y));
+                    if by_both.abs() >= UNSEEN {
+                        let turned = turn(0, x.away).rotate(turn(1, y.away));
+                        reads.push(Read { of, f: DVec2::new(x.seen, y.seen), leaves: by_both * turned });
+                    }
+                }
+            }
+        }
+        reads
+    }
+}
+
+/// Expected squared error of a pixel, of the linear range.
+pub(in crate::plan) fn error2(waves: &Waves, filtered: &[f64], read: &[Wave]) -> f64 {
+    let parts = waves.0.iter().zip(filtered).zip(read);
+    parts.map(|((wave, &ideal), &read)| wave.power * (ideal * read - Wave::new(wave.exact, 0.0)).length_squared()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        plan::{
+            SurfaceReads,
+            transfer::{Path, read_wave},
+        },
+        temporal::TapStage,
+    };
+
+    #[test]
+    fn four_waves_at_a_time_are_as_one_by_one() {
+        let waves = Waves::new(&Spectrum::flat(-2.0), DMat2::from_diagonal(DVec2::splat(3.5)), DMat2::IDENTITY, None);
+        assert_eq!(waves.0.len(), TABLE.len(), "all are seen");
+        let stages = [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 3 }, TapStage::SplineOrGrid { most: 7 }];
+        for (stage, scale) in stages.into_iter().flat_map(|stage| [0.9, 1.3, 2.9, 6.1].map(|scale| (stage, scale))) {
+            let area = Footprint::new(scale * DVec2::new(1.0, 0.2), scale * DVec2::new(-0.1, 0.8), stage);
+            let along = DVec2::new(31.3, -17.9);
+            let samples = [1, 2, 7, 40, 300].map(|samples| Over::Samples(Path { along, samples }));
+            for over in samples.into_iter().chain([Over::Instant, Over::All(along)]) {
+                let beside_px = DVec2::new(0.37, 0.81);
+                for (wave, found) in waves.0.iter().zip(waves.read(&area, over, beside_px)) {
+                    let f = TABLE[wave.index].f;
+                    let expected = read_wave(f, &area, over, beside_px);
+                    assert!(found.distance(expected) < 2e-5, "{stage:?} {scale} {over:?} {f}: {found} {expected}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_aligned_pixel_reads_nothing_between_pixels_and_one_beside_does() {
+        let spectrum = Spectrum::flat(-2.0);
+        let filter = SurfaceFilter::new(DMat2::IDENTITY, SurfaceReads::Grid);
+        let error = |stage, beside_px| {
+            let area = Footprint::new(DVec2::X, DVec2::Y, stage);
+            let waves = Waves::new(&spectrum, DMat2::IDENTITY, DMat2::IDENTITY, None);
+            error2(&waves, &waves.filtered(&filter), &waves.read(&area, Over::Instant, beside_px))
+        };
+        let half = DVec2::splat(0.5);
+        assert!(error(TapStage::Bilinear, half) > 2.0 * error(TapStage::Bilinear, DVec2::ZERO));
+        assert!(error(TapStage::Bilinear, half) > 1.5 * error(TapStage::Spline, half));
+        assert!(error(TapStage::Spline, half) > 2.0 * error(TapStage::Spline, DVec2::ZERO));
+    }
+}
