@@ -67,4 +67,8 @@ struct Frame {
     planes: array<vec4<f32>, 4>,
 }
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> given_frame: Frame;
+
+// What the kernels read, copied where they begin: llvmpipe reads each number of a uniform buffer lane by lane where a loop or condition stands around it
+// (docs/PERFORMANCE.md, "Reads of buffers").
+var<private> frame: Frame;

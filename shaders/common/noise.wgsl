@@ -1,8 +1,9 @@
 // Counter-based noise: a pure function of (seed, frame, pixel, stream), so frames may come in any order.
 // Twin: camsim_core::noise.
 
-// Inverse normal CDF over octaves of the tail probability: what each segment of camsim_core::noise::tail_table begins with, and what it adds.
-@group(0) @binding(1) var<storage, read> noise_table: array<vec2<f32>>;
+// Inverse normal CDF over octaves of the tail probability: what each segment of camsim_core::noise::tail_table begins with, and what it adds; one
+// row an octave. By the sampler of one texel (reverse/ideal_frame.wgsl): llvmpipe reads storage buffers lane by lane.
+@group(0) @binding(1) var noise_table: texture_2d<f32>;
 
 // Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 9(3), 2020.
 fn pcg4d(key: vec4<u32>) -> vec4<u32> {
@@ -29,7 +30,8 @@ fn normal_from_bits(bits: u32) -> f32 {
     let mantissa = (x << lead) & 0x7fffffu; // fraction of the octave, 23 bits
     let segment = mantissa >> 19u;
     let t = f32(mantissa & 0x7ffffu) * (1.0 / 524288.0);
-    let entry = noise_table[lead * 16u + segment];
+    let at = (vec2<f32>(f32(segment), f32(lead)) + 0.5) * (1.0 / vec2<f32>(textureDimensions(noise_table)));
+    let entry = textureSampleLevel(noise_table, texel_sampler, at, 0.0).xy;
     let value = entry.x + t * entry.y;
     return select(value, -value, (bits >> 31u) == 1u);
 }

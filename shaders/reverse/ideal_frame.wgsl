@@ -1,7 +1,8 @@
 // Access to the ideal frame: linear colour and reversed depth d = near / z.
 @group(1) @binding(0) var ideal_color: texture_2d<f32>;
 @group(1) @binding(1) var ideal_sampler: sampler;
-@group(1) @binding(9) var depth_sampler: sampler;
+// Of one texel, that at the place.
+@group(1) @binding(9) var texel_sampler: sampler;
 @group(1) @binding(2) var ideal_depth: texture_2d<f32>;
 
 // A number of the frame that says where the kernel goes: how often a loop turns, whether there is something to do. What follows from uniforms alone makes
@@ -17,7 +18,7 @@ fn coords_phase() -> f32 {
 
 // A direction seen from the key camera (any positive scale) to ideal pixels.
 fn ideal_px_from_point(in_key: vec3<f32>) -> vec2<f32> {
-    return frame.ideal_focal_px * (in_key.xy / in_key.z) + frame.ideal_principal_px;
+    return frame.ideal_focal_px * (in_key.xy * (1.0 / in_key.z)) + frame.ideal_principal_px;
 }
 
 fn inside_ideal(at_px: vec2<f32>) -> bool {
@@ -47,7 +48,7 @@ fn inverse_depth(at_px: vec2<f32>) -> f32 {
     let b = around.first;
     let top = around.last;
     let t = around.t;
-    let four = textureGather(0, ideal_depth, depth_sampler, vec2<f32>(b + 1) * (1.0 / vec2<f32>(textureDimensions(ideal_depth))));
+    let four = textureGather(0, ideal_depth, texel_sampler, vec2<f32>(b + 1) * (1.0 / vec2<f32>(textureDimensions(ideal_depth))));
     let d00 = four.w;
     let d10 = four.z;
     let d01 = four.x;

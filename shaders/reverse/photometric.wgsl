@@ -1,13 +1,14 @@
 // Vignette, light, noise, saturation on linear values (paper section 7, fig. 9). Twin: camsim_core::photometric.
 
-// Vignette weights at output size, after thresholds; one value 1.0 when there is no vignette.
-@group(1) @binding(4) var<storage, read> vignette: array<f32>;
+// Vignette weights at output size, after thresholds; one texel of 1.0 when there is no vignette.
+@group(1) @binding(4) var vignette: texture_2d<f32>;
 
 const NOISE_STREAM: u32 = 1u;
 
 fn vignette_weight(pixel: vec2<u32>) -> f32 {
-    let i = pixel.y * frame.size_px.x + pixel.x;
-    return vignette[min(i, arrayLength(&vignette) - 1u)];
+    // A single texel is that of all pixels: places beyond the border go to it.
+    let at = (vec2<f32>(pixel) + 0.5) * (1.0 / vec2<f32>(textureDimensions(vignette)));
+    return textureSampleLevel(vignette, texel_sampler, at, 0.0).x;
 }
 
 fn photometric(pixel: vec2<u32>, color: vec3<f32>, weight: f32) -> vec3<f32> {

@@ -26,6 +26,7 @@ struct Listed {
 
 @compute @workgroup_size(64)
 fn rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    frame = given_frame;
     let place = id.y * groups.x * 64u + id.x;
     if (place >= listed.count) {
         return;

@@ -21,6 +21,7 @@ const SIDE: u32 = 8u;
 
 @compute @workgroup_size(SIDE, SIDE)
 fn reverse(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_id) local: vec3<u32>) {
+    frame = given_frame;
     take_pixels(group.xy, local.xy);
 }
 

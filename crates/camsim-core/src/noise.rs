@@ -5,7 +5,7 @@
 /// Octaves of the tail probability that 24 bits can reach.
 const OCTAVES: usize = 24;
 /// Linear segments in each octave.
-const SEGMENTS: usize = 16;
+pub const SEGMENTS: usize = 16;
 /// Stream of the sensor's additive Gaussian noise.
 pub const NOISE_STREAM: u32 = 1;
 

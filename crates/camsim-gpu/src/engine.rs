@@ -21,7 +21,6 @@ use crate::{
 };
 use camsim_core::{
     frame::RenderedFrame,
-    noise::tail_segments,
     plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
     pose::CameraPose,
     scenario::Channel,
@@ -44,7 +43,7 @@ pub(crate) use error::RenderErrorBase;
 pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
 use readback::{Output, coords, look_for_unknown, read_mapped};
-use renew::{storage_buffer, vignette_buffer};
+use renew::{noise_table, vignette};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
 /// Frames that the device works on while the host reads an older one.
@@ -126,8 +125,8 @@ impl Engine {
         let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some(), sequence.scene.fog_visibility_m)?;
         let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
         let session = Session {
-            vignette: vignette_buffer(gpu, &sequence),
-            noise_table: storage_buffer(gpu, "camsim.noise_table", tail_segments().as_flattened()),
+            vignette: vignette(gpu, &sequence),
+            noise_table: noise_table(gpu),
             ideal_pass,
             reverse_pass: ReversePass::new(gpu),
             lens_pass: None,
@@ -189,8 +188,8 @@ pub struct Session<'a> {
     slots: Vec<Slot>,
     /// Pixels of the frame at work that may see silhouettes, for frames that have any.
     lists: Option<[wgpu::Buffer; 2]>,
-    vignette: wgpu::Buffer,
-    noise_table: wgpu::Buffer,
+    vignette: wgpu::TextureView,
+    noise_table: wgpu::TextureView,
     coords_phase: f32,
 }
 

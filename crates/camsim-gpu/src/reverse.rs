@@ -41,8 +41,8 @@ const WORKGROUP_PX: u32 = 8;
 pub struct ReverseBindings<'a> {
     /// [`FrameUniforms`].
     pub frame: &'a wgpu::Buffer,
-    /// Normal quantiles.
-    pub noise_table: &'a wgpu::Buffer,
+    /// Normal quantiles, a row an octave.
+    pub noise_table: &'a wgpu::TextureView,
     /// Ideal colour.
     pub color: &'a wgpu::TextureView,
     /// Ideal depth.
@@ -52,7 +52,7 @@ pub struct ReverseBindings<'a> {
     /// Relative poses of the lines, or their times for the constant-twist solvers.
     pub poses: &'a wgpu::Buffer,
     /// Vignette weights.
-    pub vignette: &'a wgpu::Buffer,
+    pub vignette: &'a wgpu::TextureView,
     /// Lens map, when the key reads one.
     pub lens_map: Option<&'a wgpu::TextureView>,
     /// Linear R G B A.
@@ -239,13 +239,13 @@ impl Variant {
     fn bind(&self, gpu: &GpuContext, [sampler, nearest]: &[wgpu::Sampler; 2], b: &ReverseBindings<'_>) -> Groups {
         let view = |view| wgpu::BindingResource::TextureView(view);
         let mut resources: [Vec<(u32, wgpu::BindingResource<'_>)>; 4] = [
-            vec![(0, b.frame.as_entire_binding()), (1, b.noise_table.as_entire_binding())],
+            vec![(0, b.frame.as_entire_binding()), (1, view(b.noise_table))],
             vec![
                 (0, view(b.color)),
                 (1, wgpu::BindingResource::Sampler(sampler)),
                 (2, view(b.depth)),
                 (3, b.poses.as_entire_binding()),
-                (4, b.vignette.as_entire_binding()),
+                (4, view(b.vignette)),
                 (9, wgpu::BindingResource::Sampler(nearest)),
             ],
             Vec::new(),
@@ -282,13 +282,14 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
     let texture =
         |sample_type| wgpu::BindingType::Texture { sample_type, view_dimension: wgpu::TextureViewDimension::D2, multisampled: false };
-    let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, storage(true))];
+    let numbers = || texture(wgpu::TextureSampleType::Float { filterable: false });
+    let frame = vec![entry(0, buffer(wgpu::BufferBindingType::Uniform)), entry(1, numbers())];
     let mut ideal = vec![
         entry(0, texture(wgpu::TextureSampleType::Float { filterable: true })),
         entry(1, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)),
-        entry(2, texture(wgpu::TextureSampleType::Float { filterable: false })),
+        entry(2, numbers()),
         entry(3, storage(true)),
-        entry(4, storage(true)),
+        entry(4, numbers()),
         entry(9, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering)),
     ];
     if key.edges != EdgeKind::None {
@@ -303,7 +304,7 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
     }
     let lens = match key.ray {
         RayStage::Pinhole | RayStage::GaussNewton => Vec::new(),
-        RayStage::LensMap => vec![entry(0, texture(wgpu::TextureSampleType::Float { filterable: false }))],
+        RayStage::LensMap => vec![entry(0, numbers())],
     };
     let mut out = vec![entry(0, storage(false))];
     if key.truth {

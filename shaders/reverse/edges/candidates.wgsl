@@ -34,6 +34,7 @@ fn may_meet_others(pixel: vec2<u32>, ray: Ray) -> bool {
 
 @compute @workgroup_size(64)
 fn ask(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    frame = given_frame;
     let place = id.y * groups.x * 64u + id.x;
     if (place >= candidates.count) {
         return;

@@ -6,13 +6,19 @@
 // Above this the texel says "no pre-image"; see the lens_inverse stage.
 const INVALID_ABOVE: f32 = 1e29;
 
+// By the sampler of one texel: llvmpipe loads a texel with a level of detail for each lane.
+fn map_at(pixel: vec2<i32>) -> vec2<f32> {
+    let at = (vec2<f32>(pixel) + 0.5) * (1.0 / vec2<f32>(textureDimensions(lens_map)));
+    return textureSampleLevel(lens_map, texel_sampler, at, 0.0).xy;
+}
+
 // One-sided or central difference of the map along `step`, over valid texels only.
 fn map_difference(pixel: vec2<i32>, step: vec2<i32>, centre: vec2<f32>) -> vec2<f32> {
     let last = vec2<i32>(frame.size_px) - 1;
     let after_at = min(pixel + step, last);
     let before_at = max(pixel - step, vec2<i32>(0));
-    let after = textureLoad(lens_map, after_at, 0).xy;
-    let before = textureLoad(lens_map, before_at, 0).xy;
+    let after = map_at(after_at);
+    let before = map_at(before_at);
     let has_after = after.x < INVALID_ABOVE && any(after_at != pixel);
     let has_before = before.x < INVALID_ABOVE && any(before_at != pixel);
     if (has_after && has_before) {
@@ -29,7 +35,7 @@ fn map_difference(pixel: vec2<i32>, step: vec2<i32>, centre: vec2<f32>) -> vec2<
 
 fn lens_ray(pixel: vec2<u32>) -> Ray {
     let at = vec2<i32>(pixel);
-    let uv = textureLoad(lens_map, at, 0).xy;
+    let uv = map_at(at);
     if (uv.x >= INVALID_ABOVE) {
         return Ray(vec2<f32>(0.0), vec2<f32>(0.0), vec2<f32>(0.0), false);
     }

@@ -63,11 +63,17 @@ fn settled_inverse_depth_from(guess: f32, uv: vec2<f32>, pose: Pose) -> f32 {
     return further_looks(direction, shift, Settled(guess, depth_on_line(direction, shift, guess, 0.0))).in_key;
 }
 
-// Where a surface of this inverse depth in the key frame is seen.
+// Where a surface of this inverse depth in the key frame is seen: (x, y, 1) z_key = z (R d + w t) with w = w_key (R d)_z / (1 - t_z w_key) is linear in
+// w_key, (x, y) = (1 - t_z w_key) (R d)_xy / (R d)_z + w_key t_xy, so that one division does.
 fn source_of_depth(uv: vec2<f32>, pose: Pose, found: f32) -> Source {
     let direction = rotate(pose, vec3<f32>(uv, 1.0));
     let shift = translation(pose);
-    return source_at(direction, shift, depth_on_line(direction, shift, found, 0.0));
+    let scale = 1.0 - shift.z * found;
+    let is_before = scale > 1e-3;
+    let far = direction.xy * (1.0 / direction.z);
+    let at_px = frame.ideal_focal_px * select(far, scale * far + found * shift.xy, is_before) + frame.ideal_principal_px;
+    let far_px = frame.ideal_focal_px * far + frame.ideal_principal_px;
+    return Source(at_px, depth_on_line(direction, shift, found, 0.0), direction.z > 0.0 && inside_ideal(at_px), far_px);
 }
 
 // The depth is looked up once more, where the ray at last looks: what led there was found one look-up earlier.

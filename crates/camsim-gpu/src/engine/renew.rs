@@ -3,7 +3,13 @@
 
 use std::sync::Arc;
 
-use camsim_core::{photometric::vignette_weights, plan::Planner, scenario::Channel, sequence::Sequence};
+use camsim_core::{
+    noise::{SEGMENTS, tail_segments},
+    photometric::vignette_weights,
+    plan::Planner,
+    scenario::Channel,
+    sequence::Sequence,
+};
 use wgpu::util::DeviceExt;
 
 use super::{Engine, FRAMES_IN_FLIGHT, RenderError, Session, slot::Slot};
@@ -39,7 +45,7 @@ impl Session<'_> {
         }
         self.lens_map = None;
         self.zoom_maps.clear();
-        self.vignette = vignette_buffer(gpu, &sequence);
+        self.vignette = vignette(gpu, &sequence);
         // Bind groups hold what has just been replaced.
         self.targets.iter_mut().flat_map(|target| &mut target.groups).for_each(|groups| groups.clear());
         self.planner = planner;
@@ -62,20 +68,36 @@ impl Engine {
     }
 }
 
-pub(super) fn storage_buffer(gpu: &GpuContext, label: &str, values: &[f32]) -> wgpu::Buffer {
-    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+/// Numbers that never change, by places: one or two a texel.
+fn table(gpu: &GpuContext, label: &str, [width, height]: [u32; 2], format: wgpu::TextureFormat, values: &[f32]) -> wgpu::TextureView {
+    let descriptor = wgpu::TextureDescriptor {
         label: Some(label),
-        contents: bytemuck::cast_slice(values),
-        usage: wgpu::BufferUsages::STORAGE,
-    })
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    let order = wgpu::util::TextureDataOrder::LayerMajor;
+    let texture = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, bytemuck::cast_slice(values));
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+/// What the segments of the normal quantiles begin with and add, a row an octave.
+pub(super) fn noise_table(gpu: &GpuContext) -> wgpu::TextureView {
+    let segments = tail_segments();
+    let size = [SEGMENTS as u32, (segments.len() / SEGMENTS) as u32];
+    table(gpu, "camsim.noise_table", size, wgpu::TextureFormat::Rg32Float, segments.as_flattened())
 }
 
 /// Weights of the vignette map at every pixel; one for all without a map.
-pub(super) fn vignette_buffer(gpu: &GpuContext, sequence: &Sequence) -> wgpu::Buffer {
+pub(super) fn vignette(gpu: &GpuContext, sequence: &Sequence) -> wgpu::TextureView {
     let camera = &sequence.scenario.camera;
-    let weights = match &sequence.vignette {
-        Some(map) => vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds),
-        None => vec![1.0],
+    let (size, weights) = match &sequence.vignette {
+        Some(map) => (camera.size_px, vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds)),
+        None => ([1, 1], vec![1.0]),
     };
-    storage_buffer(gpu, "camsim.vignette", &weights)
+    table(gpu, "camsim.vignette", size, wgpu::TextureFormat::R32Float, &weights)
 }

@@ -3,8 +3,10 @@
 var<private> begin_depth: f32;
 var<private> depth_slope: f32;
 var<private> depth_bend: f32;
+var<private> node_share: f32;
 
 fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
+    node_share = 1.0 / f32(frame.nodes - 1u);
     let middle = settled_inverse_depth(ray.uv, pose_of_mid(pixel));
     begin_depth = settled_inverse_depth_from(middle, ray.uv, pose_of_step(pixel, 0u));
     let end = settled_inverse_depth_from(middle, ray.uv, pose_of_end(pixel));
@@ -14,6 +16,6 @@ fn first_node(pixel: vec2<u32>, ray: Ray) -> Source {
 }
 
 fn next_node(ray: Ray, node: u32, pose: Pose) -> Source {
-    let share = f32(node) / f32(frame.nodes - 1u);
+    let share = f32(node) * node_share;
     return source_of_depth(ray.uv, pose, begin_depth + share * (depth_slope + share * depth_bend));
 }
