@@ -11,8 +11,11 @@ const P99: f64 = 3.035;
 /// Roundings, of the size of the distorted radius each, that the residual of the lens inverse takes: the square of the radius, two
 /// polynomials, their product with u and v, the tangential terms and the difference, in quadrature.
 const LENS_ROUNDINGS: f64 = 4.0;
-/// Roundings of a component of `R d`: three entries of R, three products, two sums, in quadrature.
-const ROTATION_ROUNDINGS: f64 = 2.8;
+/// Roundings of a component of `R d + w t`: three entries of R, three products, three sums, in quadrature.
+const ROTATION_ROUNDINGS: f64 = 3.0;
+/// Squared roundings of a place from the principal point: 1 / z, its product with x, with 1 - t_z w and with f, that factor itself, and the sum with w t
+/// (`source_of_depth` of the shader, which has the most).
+const PLACE_ROUNDINGS2: f64 = 6.0;
 /// Relative roundings of an inverse depth: rasterised, blended, and solved for.
 const DEPTH_ROUNDINGS: f64 = 8.0;
 
@@ -51,8 +54,8 @@ impl Rounding {
             RayStage::GaussNewton => GAUSS_NEWTON_STOP_PX * stretch(),
         };
         let from_centre = at_px - ideal.principal_px;
-        // x / z and f x / z, and the sum.
-        let place_px = (2.0 * from_centre.length_squared() + at_px.length_squared()).sqrt();
+        // The last one is the sum with the principal point.
+        let place_px = (PLACE_ROUNDINGS2 * from_centre.length_squared() + at_px.length_squared()).sqrt();
         let slant = (1.0 + (from_centre / ideal.focal_px).length_squared()).sqrt();
         let turned_px = match temporal {
             TemporalStage::Identity => 0.0,
