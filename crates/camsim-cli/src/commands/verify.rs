@@ -33,7 +33,7 @@ const DEFAULT_FRAMES: u64 = 5;
 /// The error is that of the source coordinates: how far from the point that a pixel's own ray meets at its own instant the plan has looked,
 /// in pixels of the ideal frame. Pixels within 3 px of a silhouette, or whose point the ideal frame does not see, are counted apart. With an
 /// exposure several of its instants are measured and the worst is shown. The exit code is 1 if the 99th percentile of any frame is
-/// above quality.max_error_px. Beneath stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
+/// above quality.max_error_px, and with --pictures if a picture is farther off than quality.max_error_dn. Beneath stands how much of the picture shows what no ideal frame sees, as predicted and as found. Where less than a twentieth of the pixels is away from silhouettes it is that of all pixels; where more than
 /// a hundredth is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
 ///
 /// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
@@ -62,7 +62,8 @@ pub struct Args {
 struct Report {
     adapter: String,
     tolerance_px: f64,
-    /// Whether every frame keeps the tolerance.
+    tolerance_dn: f64,
+    /// Whether every frame keeps the tolerances: `quality.max_error_px`, and with pictures `quality.max_error_dn`.
     kept: bool,
     frames: Vec<Verified>,
 }
@@ -78,6 +79,8 @@ struct Verified {
     kept: bool,
     as_predicted: bool,
     picture: Option<Picture>,
+    /// What the prediction for the picture leaves out.
+    not_in_the_picture: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -144,7 +147,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let adapter = engine.gpu().adapter.to_string();
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
     let tolerance_px = scenario.quality.max_error_px;
-    let mut report = Report { adapter, tolerance_px, kept: true, frames: Vec::new() };
+    let tolerance_dn = scenario.quality.max_error_dn;
+    let mut report = Report { adapter, tolerance_px, tolerance_dn, kept: true, frames: Vec::new() };
     if !args.json {
         let allowed_px = scenario.quality.max_terrain_error_px;
         console
@@ -156,9 +160,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     for &frame in &frames {
         let verified = verify(frame, &mut session, &oracle, tolerance_px, args.pictures)?;
-        report.kept &= verified.kept;
+        report.kept &= verified.kept && verified.picture.as_ref().is_none_or(|picture| picture.kept);
         if !args.json {
-            print(&verified, console)?;
+            print(&verified, tolerance_dn, console)?;
         }
         report.frames.push(verified);
     }
@@ -168,9 +172,16 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if report.kept {
         return Ok(());
     }
-    let broken: Vec<String> = report.frames.iter().filter(|frame| !frame.kept).map(|frame| frame.frame.to_string()).collect();
-    let why = report.frames.iter().find(|frame| !frame.kept).map_or_else(String::new, why_broken);
-    Err(Failure::failed(anyhow!("the tolerance of {tolerance_px} px is broken in frame {}: {why}", broken.join(", "))))
+    let frames_where = |is_broken: &dyn Fn(&Verified) -> bool| {
+        let broken: Vec<String> = report.frames.iter().filter(|frame| is_broken(frame)).map(|frame| frame.frame.to_string()).collect();
+        broken.join(", ")
+    };
+    let Some(first) = report.frames.iter().find(|frame| !frame.kept) else {
+        let frames = frames_where(&|frame| frame.picture.as_ref().is_some_and(|picture| !picture.kept));
+        return Err(Failure::failed(anyhow!("quality.max_error_dn = {tolerance_dn} is broken in frame {frames}")));
+    };
+    let frames = frames_where(&|frame| !frame.kept);
+    Err(Failure::failed(anyhow!("the tolerance of {tolerance_px} px is broken in frame {frames}: {}", why_broken(first))))
 }
 
 /// Coordinates are asked for here whatever `output.channels` says, so that leaving them out is no way out.
@@ -226,6 +237,7 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
         kept: p99_px <= tolerance_px,
         as_predicted: p99_px <= first.plan.predicted.total_px,
+        not_in_the_picture: first.plan.not_in_the_picture(),
         predicted: first.plan.predicted,
         measured: Measured {
             smooth: errors.smooth.into(),
@@ -310,7 +322,7 @@ const VOID: &str = "nothing";
 const HEADER: &str =
     " frame |  predicted   measured        rms        max | at silhouettes        rms        max | falsely valid  missing | terrain off |";
 
-fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> {
+fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Verified { frame, predicted, measured, .. } = verified;
     let Measured { smooth, silhouettes, all, judged_by, falsely_valid, missing, hole_share } = measured;
     let terrain_off = verified.level_of_detail.as_ref().map_or_else(|| "-".to_owned(), |detail| format!("{:.3}", detail.max_error_px));
@@ -339,11 +351,18 @@ fn print(verified: &Verified, console: &mut Console<'_>) -> Result<(), Failure> 
             "       | picture: PSNR {all}, without silhouettes {smooth}, at silhouettes {silhouettes}, largest difference {max:.3}"
         ))?;
         let where_ = if predicted.silhouettes.is_some() { "in all" } else { "without silhouettes" };
-        let verdict = if *kept { "kept" } else { "BROKEN" };
+        let verdict = match (*kept, *predicted_dn > tolerance_dn) {
+            (true, _) => "kept",
+            (false, true) => "BROKEN as predicted",
+            (false, false) => "BROKEN against the prediction",
+        };
         console.line(format_args!(
-            "       | {where_} {rms_dn:.2}/255 (RMS), predicted {predicted_dn:.2}: quality.max_error_dn is {verdict}; without silhouettes predicted {}",
+            "       | {where_} {rms_dn:.3}/255 (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; without silhouettes predicted {}",
             estimate(resampling_dn.hypot(*blur_dn).hypot(layers_dn))
         ))?;
+        for cause in &verified.not_in_the_picture {
+            console.line(format_args!("       | not in that prediction: {cause}"))?;
+        }
     }
     Ok(())
 }

@@ -247,6 +247,21 @@ impl Predicted {
     }
 }
 
+/// Sources that are off by more, ideal pixels, show in a picture beside what sampling costs: that much of a wave four pixels long is a third of it.
+const VISIBLE_PX: f64 = 0.25;
+
+impl FramePlan {
+    /// What makes the picture wrong and is no part of its predicted error, for people to read.
+    #[must_use]
+    pub fn not_in_the_picture(&self) -> Vec<String> {
+        let px = self.predicted.total_px;
+        let displaced =
+            (px > VISIBLE_PX).then(|| format!("what is seen up to {px:.2} px beside its place (quality.max_error_px bounds that)"));
+        let paper = (self.preset == Preset::Paper).then(|| "vignette, fog and stored colours as the paper has them".to_owned());
+        [displaced, paper].into_iter().flatten().collect()
+    }
+}
+
 impl fmt::Display for FramePlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Motion { nearest_m, travel_m, rotation_rad, parallax_px, rotation_px, blur_px, blur_sagitta_px, .. } = self.motion;
@@ -266,6 +281,9 @@ impl fmt::Display for FramePlan {
         writeln!(f, "  moves a pixel by at most {rotation_px:.3} px (rotation) + {parallax_px:.3} px (parallax)")?;
         writeln!(f, "  longest blur path {blur_px:.3} px, its chord misses it by at most {blur_sagitta_px:.2e} px")?;
         self.predicted.write(f)?;
+        for cause in self.not_in_the_picture() {
+            writeln!(f, "  not in it: {cause}")?;
+        }
         writeln!(f, "passes")?;
         for pass in self.passes() {
             writeln!(f, "  {pass}")?;

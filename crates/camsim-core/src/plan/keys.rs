@@ -65,8 +65,8 @@ pub(super) fn wanted(
     };
     match temporal {
         TemporalStage::Reproject { .. } => {}
-        TemporalStage::Identity => return one("nothing moves within the frame, or by too little to matter".into()),
-        TemporalStage::Rotation => return one("there is no parallax within the frame, or too little to matter".into()),
+        TemporalStage::Identity => return one("nothing moves within the frame, or by too little for quality.max_error_px".into()),
+        TemporalStage::Rotation => return one("there is no parallax within the frame, or too little for quality.max_error_px".into()),
         TemporalStage::Linear | TemporalStage::Rk2 => return one("solvers of a constant twist look into a single one".into()),
     }
     if let Some(count) = quality.key_frames.value() {

@@ -90,8 +90,7 @@ impl Look<'_> {
                     let (with_rays, fine) = with_rays();
                     // Where nothing keeps the tolerance silhouettes may take all of it.
                     let plain = if plain.within || with_rays.within { plain } else { plain_if(&|_| true) };
-                    let is_as_good = if with_rays.within { plain.within } else { plain.total_dn <= NEARLY * with_rays.total_dn };
-                    let is_plain = plain.within && !with_rays.within || is_as_good && plain.price.ms < with_rays.price.ms;
+                    let is_plain = is_better(&plain, &with_rays);
                     (if is_plain { plain } else { with_rays }, is_plain, fine)
                 }
             }
@@ -118,6 +117,13 @@ impl Look<'_> {
         let frames = self.common.map_or(1.0, |common| common.count() as f64);
         pixels(scenery.ideal.size_px) / (pixels(self.reach.camera.size_px) * self.reach.least_scale().powi(2) * frames)
     }
+}
+
+/// Whether one is the better choice: within the tolerance, or where neither is, near the least error that there is; and of two that are, the cheaper one.
+fn is_better(one: &Choice, other: &Choice) -> bool {
+    let least_dn = one.total_dn.min(other.total_dn);
+    let is_good = |choice: &Choice| if one.within || other.within { choice.within } else { choice.total_dn <= NEARLY * least_dn };
+    is_good(one) && (!is_good(other) || one.price.ms < other.price.ms)
 }
 
 /// Whether a scale is not above a usual one; those that are asked for, or the lens needs, always are.
@@ -147,4 +153,28 @@ fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers
     }
     let least_dn = failed.iter().map(|(choice, _)| choice.total_dn).fold(f64::INFINITY, f64::min);
     failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn).unwrap_or_else(|| choose(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_keeps_the_tolerance_is_taken_then_what_is_most_exact_then_what_is_cheaper() {
+        let choice = |total_dn: f64, within: bool, ms: f64| Choice {
+            sampling: Sampling::of_paper(),
+            price: Price { ms, ..Price::default() },
+            total_dn,
+            within,
+        };
+        let cases = [
+            ("the dear one keeps it", choice(0.9, true, 50.0), choice(1.1, false, 10.0)),
+            ("both keep it", choice(0.9, true, 10.0), choice(0.3, true, 50.0)),
+            ("none does, and the cheap one is far off", choice(0.60, false, 50.0), choice(0.95, false, 10.0)),
+            ("none does, and both are near", choice(0.65, false, 10.0), choice(0.60, false, 50.0)),
+        ];
+        for (what, better, worse) in cases {
+            assert!(is_better(&better, &worse) && !is_better(&worse, &better), "{what}");
+        }
+    }
 }

@@ -284,7 +284,8 @@ impl Report {
     }
 
     /// RMS of the source coordinates against time, both logarithmic. A point is a method's geometric mean over the cases of one kind; for each kind
-    /// of case a curve joins the methods that no other beats, and the others and the paper's preset stand alone.
+    /// of case a curve joins the methods of which each is more exact than all that take less time; the others and the paper's preset stand alone. (Whether a
+    /// row is beaten, by more than rounds differ, the table tells.)
     ///
     /// # Errors
     /// Nothing was measured.
@@ -326,12 +327,12 @@ impl Report {
             beaten.extend(rest);
             series.push(Series { name: group.to_owned(), points: front, joined: true });
         }
-        series.push(Series { name: "beaten by another method".to_owned(), points: beaten, joined: false });
+        series.push(Series { name: "not on a curve".to_owned(), points: beaten, joined: false });
         series.push(Series { name: "paper preset".to_owned(), points: paper, joined: false });
         let plot = Plot {
             title: format!("Error against time, camsim {}, {}", self.version, self.adapter.split(" (").next().unwrap_or_default()),
             x_label: "ms a frame (median)".into(),
-            y_label: "RMS of the source coordinates, px".into(),
+            y_label: "RMS of the source coordinates, px (geometric means over the cases of a kind)".into(),
             log: [true, true],
             series,
         };
