@@ -58,6 +58,12 @@ impl Engine {
     /// Refuses output frames that no storage buffer holds.
     pub(super) fn check_output(&self, planner: &Planner) -> Result<(), GpuError> {
         let [width, height] = planner.sequence().scenario.camera.size_px.map(u64::from);
+        // Lens map and vignette are textures of its size.
+        let (needed, limit) = (width.max(height), u64::from(self.gpu.max_side_px()));
+        if needed > limit {
+            let (what, limit_name) = ("a side of the output frame".into(), "max_texture_dimension_2d (px)");
+            return Err(GpuError::TooLarge { what, needed, limit_name, limit, fix: "reduce camera.size_px" });
+        }
         self.gpu.check_storage("the output frame's colour", 16 * width * height, "reduce camera.size_px")?;
         if planner.wants_truth() {
             let bytes = size_of::<Truth>() as u64 * width * height;
