@@ -189,6 +189,25 @@ fn verify_small(more: &[&str]) -> (u8, String, String) {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_picture_beyond_its_tolerance_fails_and_what_nobody_foretold_is_named() {
+    let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]", "--pictures"];
+    let verify = |more: &[&str]| verify_small(&[&centre[..], more].concat());
+    // Eight bits alone are more than that.
+    let strict = ["--set", "quality.max_error_dn=0.01"];
+    let (code, out, err) = verify(&strict);
+    assert!(code == 1 && out.contains("quality.max_error_dn = 0.01 is BROKEN as predicted"), "{out}{err}");
+    assert!(err.contains("quality.max_error_dn = 0.01 is broken in frame 3") && !out.contains("not in that prediction"), "{out}{err}");
+    let (code, out, _) = verify(&[&strict[..], &["--json"]].concat());
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let frame = &report["frames"][0];
+    assert!(code == 1 && report["kept"] == false && frame["kept"] == true && frame["picture"]["kept"] == false, "{out}");
+    // Sources may be anywhere, and the prediction for the picture knows nothing of it.
+    let (_, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=100"]);
+    assert!(out.contains("not in that prediction: what is seen up to"), "{out}{err}");
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn two_fields_far_apart_do_not_hide_an_error() {
     let centre = ["--set", "camera.principal_point_px=[47.5, 35.5]"];
     let fields = ["--json", "--set", "camera.shutter.interlace_ms=700", "--set", "quality.solver=linear"];

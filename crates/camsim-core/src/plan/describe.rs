@@ -247,13 +247,17 @@ impl Predicted {
     }
 }
 
-/// Sources that are off by more, ideal pixels, show in a picture beside what sampling costs: that much of a wave four pixels long is a third of it.
+/// Sources that are off by more, ideal pixels, show in a picture beside what sampling costs: a wave four pixels long that is moved by so much differs from itself by
+/// 2 sin(pi / 16), two fifths of it.
 const VISIBLE_PX: f64 = 0.25;
 
 impl FramePlan {
-    /// What makes the picture wrong and is no part of its predicted error, for people to read.
+    /// What makes the picture wrong and is no part of its predicted error, for people to read; nothing where nothing is predicted.
     #[must_use]
     pub fn not_in_the_picture(&self) -> Vec<String> {
+        if self.predicted.probes == 0 {
+            return Vec::new();
+        }
         let px = self.predicted.total_px;
         let displaced =
             (px > VISIBLE_PX).then(|| format!("what is seen up to {px:.2} px beside its place (quality.max_error_px bounds that)"));
