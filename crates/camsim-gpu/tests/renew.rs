@@ -94,5 +94,10 @@ fn a_sequence_that_is_refused_leaves_the_session_as_it_was() {
     let mut bad = base();
     bad.scenario.camera.focal_px = [0.0, 0.0];
     session.renew::<Infallible>(Arc::new(bad), &COLOR).expect_err("no focal length");
+    // Few pixels, but more along a side than a texture has: lens map and vignette are textures.
+    let mut wide = base();
+    wide.scenario.camera.size_px = [engine.gpu().max_side_px() + 1, 4];
+    let refused = session.renew::<Infallible>(Arc::new(wide), &COLOR).expect_err("too wide").to_string();
+    assert!(refused.contains("a side of the output frame needs") && refused.contains("reduce camera.size_px"), "{refused}");
     assert_eq!(next(&mut session, 3).color_rgba, render(&engine, &good, &COLOR, 3).frame.color_rgba);
 }
