@@ -22,6 +22,7 @@ mod bounds;
 mod contours;
 mod costs;
 mod describe;
+mod displaced;
 mod dry_run;
 mod edges;
 mod error;
@@ -252,6 +253,7 @@ impl Planner {
             (exposure, exposure.map(|exposure| look.blur_stage(exposure, edges, &sampling, motion, &ideal)), edges)
         };
         let expected = scenery.prospect.expected(&sampling, blur);
+        let shown = scenery.shown(blur.is_some());
         let tried = ideal;
         let mut case = error::Case {
             reach: &look.reach,
@@ -267,7 +269,11 @@ impl Planner {
             blur,
             straight_blur: blur.map(|_| sampling.blur_stage(exposure::ExposurePath::STRAIGHT, quality, motion.blur_px)),
             expected,
-            levels_in_the_way: levels::in_the_way(quality, &sampling, expected, &picture, scenery.layers_dn()),
+            shown: &shown,
+            most_displaced_dn: levels::for_displaced_dn(
+                quality,
+                expected.total_dn().hypot(picture.silhouettes_dn()).hypot(scenery.layers_dn()),
+            ),
             silhouettes: picture.silhouettes,
             layers: scenery.layers,
             silhouettes_in_view: scenery.reason_for_none.is_none(),
@@ -276,13 +282,13 @@ impl Planner {
         };
         let mut choice = error::choose(&case, &motion);
         for _ in 0..MOST_REFINEMENTS {
-            let missed = Some(choice.predicted.nodes_px).filter(|_| !choice.predicted.kept && demanded != Some(TemporalStage::Linear));
-            let Some(finer) = exposure.zip(missed).and_then(|(exposure, px)| exposure.finer(px, quality.max_error_px)) else { break };
+            let missed = choice.missed_px.filter(|_| demanded != Some(TemporalStage::Linear));
+            let Some(finer) = exposure.zip(missed).and_then(|(exposure, [px, most_px])| exposure.finer(px, most_px)) else { break };
             exposure = Some(finer);
             case.blur = Some(look.blur_stage(finer, edges, &sampling, motion, &tried));
             choice = error::choose(&case, &motion);
         }
-        let error::Choice { way, terrain_error_px, mut predicted, truths } = choice;
+        let error::Choice { way, terrain_error_px, mut predicted, truths, .. } = choice;
         let error::Way { temporal, blur } = way;
         if demanded.is_none() && matches!(temporal, TemporalStage::Linear | TemporalStage::Rk2) {
             // These look, and read the depth, where the point is not.
@@ -321,10 +327,9 @@ impl Planner {
             if keys.len() > 1 { looks_behind.then(|| truths.holes(&keys, quality.max_error_px)) } else { predicted.holes_of_one };
         if keys.len() > 1 && scenery.layers.is_some() {
             predicted.layers = look.layers(&keys);
-            let by_layers_dn = predicted.layers.map_or(0.0, |layers| layers.error_dn);
-            predicted.levels_in_the_way = levels::in_the_way(quality, &sampling, expected, &picture, by_layers_dn);
-            predicted.levels_kept = predicted.levels_in_the_way.is_none();
         }
+        predicted.levels_in_the_way = levels::in_the_way(quality, &sampling, &predicted, picture.is_plain);
+        predicted.levels_kept = predicted.levels_in_the_way.is_none();
         self.note_static_skips(&mut skipped, temporal);
         // Coordinates are those of the middle of the frame's own window, wherever the ideal frame is taken.
         let middle_s = 0.5 * (window_s[0] + window_s[1]);

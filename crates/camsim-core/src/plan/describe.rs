@@ -196,7 +196,7 @@ impl FramePlan {
 impl Predicted {
     /// By cause, the largest first.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, .. } = *self;
+        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, displaced_dn, .. } = *self;
         writeln!(f, "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)")?;
         if probes == 0 {
             return writeln!(f, "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty");
@@ -237,7 +237,7 @@ impl Predicted {
         });
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples{silhouettes}{layers}: {}",
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples, {displaced_dn:.2} by sources beside their place{silhouettes}{layers}: {}",
             if self.levels_kept { "within the tolerance" } else { "the tolerance is NOT KEPT" }
         )?;
         match &self.levels_in_the_way {
@@ -247,22 +247,12 @@ impl Predicted {
     }
 }
 
-/// Sources that are off by more, ideal pixels, show in a picture beside what sampling costs: a wave four pixels long that is moved by so much differs from itself by
-/// 2 sin(pi / 16), two fifths of it.
-const VISIBLE_PX: f64 = 0.25;
-
 impl FramePlan {
     /// What makes the picture wrong and is no part of its predicted error, for people to read; nothing where nothing is predicted.
     #[must_use]
     pub fn not_in_the_picture(&self) -> Vec<String> {
-        if self.predicted.probes == 0 {
-            return Vec::new();
-        }
-        let px = self.predicted.total_px;
-        let displaced =
-            (px > VISIBLE_PX).then(|| format!("what is seen up to {px:.2} px beside its place (quality.max_error_px bounds that)"));
-        let paper = (self.preset == Preset::Paper).then(|| "vignette, fog and stored colours as the paper has them".to_owned());
-        [displaced, paper].into_iter().flatten().collect()
+        let is_paper = self.predicted.probes > 0 && self.preset == Preset::Paper;
+        is_paper.then(|| "vignette, fog and stored colours as the paper has them".to_owned()).into_iter().collect()
     }
 }
 

@@ -14,6 +14,7 @@ use rayon::prelude::*;
 
 use super::{
     BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, SeenPlane, TemporalStage,
+    displaced::ShownWaves,
     dry_run::{MAX_LOOK_UPS, Trial, Truth},
     holes,
     levels::Expected,
@@ -43,6 +44,8 @@ pub(crate) const MOST_VOID_SHARE: f64 = 0.01;
 const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
 const BOUND_SHARE: f64 = 0.5;
+/// Part of an error from which on more nodes of the exposure's path are worth a try.
+const OF_NODES: f64 = 0.3;
 /// Steps of eq. 18 up to which it takes less time than a look-up of depth in every node.
 const CHEAP_RK2_STEPS: f64 = 2.0;
 /// One probe in so many is asked whether it is at a silhouette, to tell how many are; not in step with the grid of 24 columns.
@@ -70,7 +73,9 @@ pub(super) struct Case<'a> {
     /// The same for a path that is a straight line in time.
     pub straight_blur: Option<BlurStage>,
     pub expected: Expected,
-    pub levels_in_the_way: Option<String>,
+    /// What pixels show, and what sources beside their place may cost of it, 1/255 of the linear range.
+    pub shown: &'a ShownWaves,
+    pub most_displaced_dn: f64,
     /// Cost of silhouettes.
     pub silhouettes: Option<Contours>,
     /// Cost of what is mixed.
@@ -86,6 +91,8 @@ pub(super) struct Choice<'a> {
     pub way: Way,
     pub terrain_error_px: f64,
     pub predicted: Predicted,
+    /// How far the path between the exposure's nodes is missed, and what tolerance is to be kept, ideal pixels, where one is broken.
+    pub missed_px: Option<[f64; 2]>,
     pub truths: Truths<'a>,
 }
 
@@ -148,13 +155,25 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
     let may_skip_depth = !case.silhouettes_in_view || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match case.demanded {
         Some(temporal) => Way { temporal, blur: case.blur },
-        None => forecast.choose(tolerance_px, case.ways(motion, may_skip_depth)),
+        None => forecast.choose(case, case.ways(motion, may_skip_depth)),
     };
     let mut predicted = forecast.predict(case, way);
     if case.silhouettes_in_view {
         predicted.silhouette_share = case.silhouettes.map_or_else(|| truths.silhouette_share(), |silhouettes| silhouettes.share);
     }
-    Choice { way, terrain_error_px, predicted, truths }
+    let missed_px = missed_px(case, &predicted);
+    Choice { way, terrain_error_px, predicted, missed_px, truths }
+}
+
+/// [`Choice::missed_px`].
+fn missed_px(case: &Case<'_>, predicted: &Predicted) -> Option<[f64; 2]> {
+    let (max_error_px, nodes_px) = (case.sequence.scenario.quality.max_error_px, predicted.nodes_px);
+    if !predicted.kept {
+        return Some([nodes_px, max_error_px]);
+    }
+    // Grey levels follow the displacement.
+    let share_of_allowed = case.most_displaced_dn / predicted.displaced_dn;
+    (share_of_allowed < 1.0 && nodes_px > OF_NODES * predicted.total_px).then_some([nodes_px, share_of_allowed * nodes_px])
 }
 
 impl<'a> Case<'a> {
@@ -338,10 +357,12 @@ impl<'a> Truths<'a> {
         holes::sky_strips(&self.trial, &looked, key, self.probe_px(), gain)
     }
 
-    /// Largest miss of what lies between the depths of the exposure's ends, and between these and its middle. `elsewhere` is [`Outcome::elsewhere`] of each, if that is known.
-    fn between_px(&self, elsewhere: impl Fn(usize) -> Option<f64> + Sync) -> [f64; 2] {
+    /// Miss of what lies between the depths of the exposure's ends, and between these and its middle, of each probe, and the largest. `elsewhere` is
+    /// [`Outcome::elsewhere`] of each, if that is known.
+    fn between_px(&self, elsewhere: impl Fn(usize) -> Option<f64> + Sync) -> (Vec<[f64; 2]>, [f64; 2]) {
         let of = |(i, looked): (usize, &Looked)| self.trial.between_px(&looked.probe, &looked.truth, elsewhere(i));
         let px: Vec<[f64; 2]> = self.looked.par_iter().enumerate().with_min_len(16).map(of).collect();
-        [0, 1].map(|k: usize| self.largest(|i, _| px[i][k]))
+        let largest = [0, 1].map(|k: usize| self.largest(|i, _| px[i][k]));
+        (px, largest)
     }
 }

@@ -10,10 +10,9 @@
 use rayon::prelude::*;
 
 use super::{
-    BlurStage, SurfaceReads,
+    BlurStage, Predicted, SurfaceReads,
     costs::Price,
     exposure::ExposurePath,
-    picture::Picture,
     prospect::{Prospect, Sight},
 };
 use crate::{
@@ -29,7 +28,7 @@ const SURE: f64 = 0.8;
 /// Places that one thread asks at a time: fewer are not worth another.
 const AT_ONCE: usize = 8;
 /// Times what is expected: textures are not equally grainy everywhere.
-const SAFETY: f64 = 1.2;
+pub(super) const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
@@ -40,6 +39,9 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 9] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
+/// Part of `quality.max_error_dn` that is kept for sources beside their place, a two-hundredth of its square root's; and the part of an error which is above that anyway.
+const KEPT_FOR_DISPLACED: f64 = 0.1;
+const OF_BROKEN: f64 = 0.3;
 /// What is left of a tolerance and what is taken of it may add up to a little more.
 const ROUNDED: f64 = 1.0 + 1e-9;
 /// Most samples on one polynomial of the path.
@@ -268,7 +270,7 @@ impl Prospect<'_> {
         let expected = self.expected(sampling, blur);
         let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
         let price = self.price(sampling, blur, task.ideal_share);
-        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= task.quality.max_error_dn }
+        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= for_sampling_dn(task.quality) }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -306,27 +308,39 @@ fn dn(square: f64) -> f64 {
     (SAFETY * 255.0 * square.sqrt()).hypot(FORMAT_DN)
 }
 
-/// Why the tolerance is not kept; `None` if it is. `by_layers_dn` is what mixed light costs by having one depth.
-pub(super) fn in_the_way(
-    quality: &QualitySpec,
-    sampling: &Sampling,
-    expected: Expected,
-    picture: &Picture,
-    by_layers_dn: f64,
-) -> Option<String> {
-    let at_silhouettes_dn = picture.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-    let total_dn = expected.total_dn().hypot(at_silhouettes_dn).hypot(by_layers_dn);
-    if quality.preset == Preset::Paper || total_dn <= ROUNDED * quality.max_error_dn {
+/// What sampling, silhouettes and mixed light may take of `quality.max_error_dn`: the rest is kept for sources beside their place.
+pub(super) fn for_sampling_dn(quality: &QualitySpec) -> f64 {
+    (1.0 - KEPT_FOR_DISPLACED * KEPT_FOR_DISPLACED).sqrt() * quality.max_error_dn
+}
+
+/// What sources beside their place may cost beside all others, 1/255: what these leave of the tolerance.
+pub(super) fn for_displaced_dn(quality: &QualitySpec, others_dn: f64) -> f64 {
+    if others_dn > for_sampling_dn(quality) {
+        return OF_BROKEN * others_dn;
+    }
+    (quality.max_error_dn.powi(2) - others_dn.powi(2)).max(0.0).sqrt()
+}
+
+/// Why the tolerance is not kept; `None` if it is.
+pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: &Predicted, is_plain: bool) -> Option<String> {
+    if quality.preset == Preset::Paper || predicted.picture_dn() <= ROUNDED * quality.max_error_dn {
         return None;
     }
-    if by_layers_dn > expected.total_dn().max(at_silhouettes_dn) {
+    let Predicted { resampling_dn, blur_dn, displaced_dn, silhouettes, layers, .. } = *predicted;
+    let sampled_dn = resampling_dn.hypot(blur_dn);
+    let at_silhouettes_dn = silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
+    let by_layers_dn = layers.map_or(0.0, |layers| layers.error_dn);
+    if displaced_dn > sampled_dn.max(at_silhouettes_dn).max(by_layers_dn) {
+        let by = if quality.solver == Auto::Auto { "" } else { " (quality.solver is given)" };
+        return Some(format!("sources beside their place{by}: {displaced_dn:.2}/255"));
+    }
+    if by_layers_dn > sampled_dn.max(at_silhouettes_dn) {
         return Some(format!("what is mixed of several surfaces moves with the depth of one: {by_layers_dn:.2}/255"));
     }
-    if at_silhouettes_dn > expected.total_dn() {
-        let how = if picture.is_plain { "where they are left as they are" } else { "with rays of their own" };
+    if at_silhouettes_dn > sampled_dn {
+        let how = if is_plain { "where they are left as they are" } else { "with rays of their own" };
         return Some(format!("quality.silhouettes: {at_silhouettes_dn:.2}/255 {how}"));
     }
-    let Expected { resampling_dn, blur_dn } = expected;
     Some(match (blur_dn > resampling_dn, quality.blur_samples, quality.footprint_taps, quality.ideal_scale) {
         (true, Auto::Value(_), ..) => format!("quality.blur_samples: {blur_dn:.2}/255"),
         (true, ..) => format!("samples over the exposure: {blur_dn:.2}/255"),

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours, dry_run, edges,
-    error, exposure, forced, layers, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
+    BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours,
+    displaced::ShownWaves, dry_run, edges, error, exposure, forced, layers, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -187,6 +187,11 @@ impl Look<'_> {
 }
 
 impl Scenery<'_> {
+    /// What its pixels show, away from silhouettes.
+    pub fn shown(&self, exposed: bool) -> ShownWaves {
+        ShownWaves::new(&self.prospect, exposed)
+    }
+
     /// RMS error over the picture by mixed light, 1/255 of the linear range.
     pub fn layers_dn(&self) -> f64 {
         self.layers.map_or(0.0, |layers| layers.error_dn)

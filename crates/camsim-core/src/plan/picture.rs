@@ -4,7 +4,7 @@ use super::{
     contours::{Contours, Outlook},
     costs::Price,
     edges,
-    levels::{Choice, FINEST_SCALE, MOST_SCALE, NEARLY, Sampling, Task},
+    levels::{Choice, FINEST_SCALE, MOST_SCALE, NEARLY, Sampling, Task, for_sampling_dn},
     look::{Look, Scenery},
     prospect::Prospect,
 };
@@ -27,6 +27,11 @@ pub(super) struct Picture {
 }
 
 impl Picture {
+    /// What silhouettes cost, 1/255 of the linear range.
+    pub fn silhouettes_dn(&self) -> f64 {
+        self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn)
+    }
+
     fn of(choice: &Choice, silhouettes: Option<Contours>, is_plain: bool, fine: u32) -> Self {
         Self { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price, total_dn: choice.total_dn }
     }
@@ -46,7 +51,7 @@ impl Look<'_> {
             };
         }
         let quality = &self.planner.sequence.scenario.quality;
-        let max_error_dn = quality.max_error_dn * self.asked.share_of_dn;
+        let max_error_dn = for_sampling_dn(quality) * self.asked.share_of_dn;
         let task = Task {
             quality,
             max_error_dn,

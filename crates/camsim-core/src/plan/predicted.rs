@@ -24,6 +24,8 @@ pub struct Predicted {
     pub resampling_dn: f64,
     /// The same of too few samples over the exposure.
     pub blur_dn: f64,
+    /// The same of sources beside their place.
+    pub displaced_dn: f64,
     /// What silhouettes cost, as they are made: left as the ideal frame's pixels show them, or with rays of their own. `None` where none can be in view, or
     /// nobody asks.
     pub silhouettes: Option<Contours>,
@@ -61,6 +63,6 @@ impl Predicted {
     /// The same without what mixed light costs by having one depth.
     pub(super) fn without_layers_dn(&self) -> f64 {
         let at_silhouettes_dn = self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-        self.resampling_dn.hypot(self.blur_dn).hypot(at_silhouettes_dn)
+        self.resampling_dn.hypot(self.blur_dn).hypot(self.displaced_dn).hypot(at_silhouettes_dn)
     }
 }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::{
     FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
     bounds::View,
-    levels::{FINEST_SCALE, NEARLY, Sampling},
+    levels::{FINEST_SCALE, NEARLY, Sampling, for_sampling_dn},
     look::{Look, Scenery},
 };
 use crate::scenario::{Auto, Preset, Silhouettes};
@@ -96,7 +96,7 @@ impl<'a> Candidates<'a> {
         };
         let all: Vec<(u64, f64)> = self.common.frames.clone().into_par_iter().map(picture_dn).collect::<Result<_, _>>()?;
         let most_dn =
-            if own.predicted.levels_kept { self.planner.sequence.scenario.quality.max_error_dn } else { own.predicted.picture_dn() };
+            if own.predicted.levels_kept { for_sampling_dn(&self.planner.sequence.scenario.quality) } else { own.predicted.picture_dn() };
         let worst = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         Ok(worst.filter(|(_, dn)| *dn > most_dn).map(|(frame, _)| frame))
     }

@@ -23,6 +23,8 @@ const BETWEEN: [f64; 2] = [-0.289, 0.289];
 const BETWEEN_STEP: usize = 2;
 /// One probe in so many is asked first whether the depth of mid-exposure does for all of it; not in step with the grid, and with phases in turn.
 const MID_STEP: usize = 7;
+/// Mean over the time between two nodes, squared, of what a polynomial through them misses, of the most: `sqrt(8/15)` for straight lines, `sqrt(24.3/47.25)` for parabolas' cubics.
+const OVER_TIME: f64 = 0.72;
 /// Probes whose exposure is looked at.
 const MISS_PROBES: usize = 32;
 /// Polynomials of the path looked at for each of them.
@@ -49,11 +51,18 @@ pub(super) struct Forecast<'a> {
     detail: Option<&'a TerrainDetail<'a>>,
     /// One for each of the probes.
     pub(super) outcomes: Vec<Outcome>,
-    /// [`Forecast::between_px`] of both, once it matters.
-    between_px: OnceLock<[f64; 2]>,
+    /// [`Forecast::between_px`] of both, of each probe and the largest, once it matters.
+    between_px: OnceLock<(Vec<[f64; 2]>, [f64; 2])>,
     /// With the depth that look-ups find at mid-exposure, of each of the probes, and of one in [`MID_STEP`]: once it matters.
     of_mid: OnceLock<Vec<OfMid>>,
     of_mid_here_and_there: OnceLock<Vec<OfMid>>,
+}
+
+/// How far the curves between the exposure's nodes miss what they stand for, ideal pixels: the largest miss with a margin, and RMS over probes and time.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Missed {
+    pub largest_px: f64,
+    rms_px: f64,
 }
 
 /// Error after n look-ups, ideal pixels.
@@ -111,50 +120,65 @@ impl Forecast<'_> {
 
     /// Largest miss of nodes that take what lies between the depths of others.
     pub(super) fn between_px(&self, way: Way) -> f64 {
-        let kind = match way.blur.map(|blur| blur.depths) {
-            Some(NodeDepths::Ends) => 0,
-            Some(NodeDepths::Three) => 1,
-            None | Some(NodeDepths::Mid | NodeDepths::Each) => return 0.0,
-        };
-        if !matches!(way.temporal, TemporalStage::Reproject { .. }) {
-            return 0.0;
-        }
-        self.between_px.get_or_init(|| {
-            let Truths { reach, ray, trial, .. } = *self.truths;
-            let between = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP).between_px(|_| None);
-            let at_phases = self.truths.between_px(|i| Some(self.outcomes[i].elsewhere));
-            [0, 1].map(|k: usize| at_phases[k].max(between[k]))
-        })[kind]
+        between_kind(way).map_or(0.0, |kind| self.between().1[kind])
     }
 
-    /// The first way within the tolerance, or the best there is.
-    pub(super) fn choose(&self, tolerance_px: f64, ways: Vec<Way>) -> Way {
+    fn between(&self) -> &(Vec<[f64; 2]>, [f64; 2]) {
+        self.between_px.get_or_init(|| {
+            let Truths { reach, ray, trial, .. } = *self.truths;
+            let (_, elsewhere) = Truths::new(reach, ray, trial, &BETWEEN, BETWEEN_STEP).between_px(|_| None);
+            let (of_each, at_phases) = self.truths.between_px(|i| Some(self.outcomes[i].elsewhere));
+            (of_each, [0, 1].map(|k: usize| at_phases[k].max(elsewhere[k])))
+        })
+    }
+
+    /// What it costs that sources are beside their place, RMS over the picture, 1/255 of the linear range.
+    fn displaced_dn(&self, case: &Case<'_>, way: Way, missed: Missed) -> f64 {
+        let scale = case.ideal.focal_px.x / case.reach.camera.focal_px.x;
+        // What is farther off than all that count is at silhouettes.
+        let most_px = self.largest(|i, _, _| self.error_px(i, way));
+        let between = between_kind(way).map(|kind| (kind, &self.between().0));
+        let of_probe = |i: usize| {
+            let error_px = self.error_px(i, way);
+            let between_px = between.map_or(0.0, |(kind, px)| px[i][kind].min(self.between_px(way)));
+            let solved_px = if error_px <= most_px { error_px + between_px } else { 0.0 };
+            solved_px.hypot(missed.rms_px) / scale
+        };
+        case.shown.displaced_dn((0..self.outcomes.len()).map(of_probe))
+    }
+
+    /// The first way within the tolerances, or the best there is.
+    pub(super) fn choose(&self, case: &Case<'_>, ways: Vec<Way>) -> Way {
+        let tolerance_px = case.sequence.scenario.quality.max_error_px;
         // What a few probes rule out is looked at more closely only if nothing else keeps the tolerance.
         let (ruled_out, in_question): (Vec<Way>, Vec<Way>) = ways.iter().copied().partition(|way| self.surely_misses(*way, tolerance_px));
-        match self.first_within(tolerance_px, in_question) {
-            Err(_) if !ruled_out.is_empty() => self.first_within(tolerance_px, ways).unwrap_or_else(|best| best),
+        match self.first_within(case, in_question) {
+            Err(_) if !ruled_out.is_empty() => self.first_within(case, ways).unwrap_or_else(|best| best),
             Ok(way) | Err(way) => way,
         }
     }
 
-    /// The first way within the tolerance; or else the best there is.
-    fn first_within(&self, tolerance_px: f64, ways: Vec<Way>) -> Result<Way, Way> {
+    /// The first way within the tolerances, of source coordinates and of what these cost in the picture; or else the best there is.
+    fn first_within(&self, case: &Case<'_>, ways: Vec<Way>) -> Result<Way, Way> {
+        let tolerance_px = case.sequence.scenario.quality.max_error_px;
         let mut best: Option<(f64, Way)> = None;
-        let mut known_nodes: Vec<((u32, u32, bool), f64)> = Vec::new();
+        let mut known_nodes: Vec<((u32, u32, bool), Missed)> = Vec::new();
         for way in ways {
             let nodes = way.blur.map_or_else(Default::default, |blur| (blur.solved(), blur.path.steps(), blur.depths == NodeDepths::Each));
-            let nodes_px = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
-                let px = self.nodes_px(way.blur);
-                known_nodes.push((nodes, px));
-                px
+            let missed = known_nodes.iter().find(|known| known.0 == nodes).map(|known| known.1).unwrap_or_else(|| {
+                let missed = self.missed(way.blur);
+                known_nodes.push((nodes, missed));
+                missed
             });
-            let total_px = self.total_px(way) + nodes_px;
-            if total_px <= tolerance_px {
+            let of_px = (self.total_px(way) + missed.largest_px) / tolerance_px;
+            let of_dn = if of_px <= 1.0 { self.displaced_dn(case, way, missed) / case.most_displaced_dn } else { 0.0 };
+            let of_tolerance = of_px.max(of_dn);
+            if of_tolerance <= 1.0 {
                 return Ok(way);
             }
             // What gains less than a twentieth is not worth its time.
-            if best.is_none_or(|(px, _)| total_px < 0.95 * px) {
-                best = Some((total_px, way));
+            if best.is_none_or(|(least, _)| of_tolerance < 0.95 * least) {
+                best = Some((of_tolerance, way));
             }
         }
         Err(best.map_or(Way { temporal: TemporalStage::Reproject { iterations: 2 }, blur: None }, |(_, way)| way))
@@ -163,7 +187,8 @@ impl Forecast<'_> {
     /// The errors of a stage by cause.
     pub(super) fn predict(&self, case: &Case<'_>, way: Way) -> Predicted {
         let (Way { temporal: stage, blur }, max_error_px) = (way, case.sequence.scenario.quality.max_error_px);
-        let nodes_px = self.nodes_px(blur);
+        let missed = self.missed(blur);
+        let nodes_px = missed.largest_px;
         let total_px = self.total_px(way) + nodes_px;
         let Expected { resampling_dn, blur_dn } = case.expected;
         let lens_px = self.largest(|_, looked, run| self.rounding(looked, run, stage).lens_px);
@@ -202,10 +227,12 @@ impl Forecast<'_> {
             format_px,
             resampling_dn,
             blur_dn,
+            displaced_dn: self.displaced_dn(case, way, missed),
             silhouettes: case.silhouettes,
             layers: case.layers,
-            levels_kept: case.levels_in_the_way.is_none(),
-            levels_in_the_way: case.levels_in_the_way.clone(),
+            // Judged when all that comes to it is known.
+            levels_kept: false,
+            levels_in_the_way: None,
             total_px,
             silhouette_share: 0.0,
             void_share,
@@ -222,9 +249,9 @@ impl Forecast<'_> {
         Rounding::new(probe, truth.at_px, run.parallax_px, &reach.camera, trial.ideal, *ray, stage)
     }
 
-    /// Largest miss of the curves between the exposure's nodes: for a surface at one depth, and where each node finds its own, along what the rays meet.
-    pub(super) fn nodes_px(&self, blur: Option<BlurStage>) -> f64 {
-        let Some(blur) = blur else { return 0.0 };
+    /// Misses of the curves between the exposure's nodes: for a surface at one depth, and where each node finds its own, along what the rays meet.
+    pub(super) fn missed(&self, blur: Option<BlurStage>) -> Missed {
+        let Some(blur) = blur else { return Missed::default() };
         let Truths { trial, looked, .. } = self.truths;
         let stretches = blur.stretches();
         let looked_at = MISSED_STRETCHES.min(stretches);
@@ -236,7 +263,18 @@ impl Forecast<'_> {
             let along_surfaces = follows.then(|| trial.miss_along_surfaces_px(probe, blur.path, stretches, i as u32 % stretches));
             along_surfaces.map_or(at_one_depth, |px| px.max(at_one_depth))
         };
-        SAFETY * looked.iter().step_by(every).enumerate().map(miss).fold(0.0, f64::max)
+        let misses: Vec<f64> = looked.iter().step_by(every).enumerate().map(miss).collect();
+        let mean2 = misses.iter().map(|px| px * px).sum::<f64>() / misses.len().max(1) as f64;
+        Missed { largest_px: SAFETY * misses.iter().copied().fold(0.0, f64::max), rms_px: OVER_TIME * mean2.sqrt() }
+    }
+}
+
+/// Which of the two misses between depths of the exposure a way has.
+fn between_kind(way: Way) -> Option<usize> {
+    match (way.temporal, way.blur?.depths) {
+        (TemporalStage::Reproject { .. }, NodeDepths::Ends) => Some(0),
+        (TemporalStage::Reproject { .. }, NodeDepths::Three) => Some(1),
+        _ => None,
     }
 }
 

@@ -101,7 +101,7 @@ impl Planner {
         let truths = Truths::new(&reach, plan.ray, trial, super::phases(&self.sequence.path, plan.blur.is_some()), 1);
         let detail = super::terrain_detail(&self.sequence, &key_pose, &ideal, plan.terrain_error_px);
         let forecast = truths.forecast(detail.as_ref());
-        let everywhere_px = SAFETY * forecast.between_px(way) + forecast.nodes_px(way.blur);
+        let everywhere_px = SAFETY * forecast.between_px(way) + forecast.missed(way.blur).largest_px;
         let known = truths.looked.par_iter().zip(&forecast.outcomes).enumerate().with_min_len(16).map(|(i, (looked, run))| {
             let px = SAFETY * forecast.error_px(i, way) + forecast.rounding(looked, run, way.temporal).total_px();
             let error = if truths.is_apart(looked) { PlaceError::Silhouette } else { PlaceError::Within(px) };
