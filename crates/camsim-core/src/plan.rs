@@ -241,12 +241,12 @@ impl Planner {
                 pose: &key_pose,
                 ideal: &ideal,
                 travel_m: motion.travel_m,
-                blur: exposure.map(|exposure| sampling.blur_stage(exposure, quality, motion.blur_px)),
                 quality,
                 max_side_px: self.max_side_px,
                 reason_for_none: scenery.reason_for_none.as_deref(),
                 plain: picture.silhouettes.as_ref().filter(|_| picture.is_plain),
                 fine: picture.fine,
+                rays: picture.rays,
                 truth: self.truth,
             };
             let edges = edges::edge_stage(&case, &mut skipped);

@@ -138,6 +138,30 @@ fn sources_beside_their_place_cost_what_is_predicted() {
     assert!(outside.len() * 10 <= if long { seen } else { 0 }, "{outside:#?}");
 }
 
+/// Where nothing keeps a tolerance the picture that is taken is near the best there is: whatever the tolerance, and not farther off than those of wider ones.
+#[test]
+fn a_tighter_tolerance_makes_no_worse_picture() {
+    // Times the least error that the cheapest may have, and what sources beside their place may add to it.
+    const NEAR_THE_BEST: f64 = 1.15 * 1.05;
+    let long = std::env::var_os("CAMSIM_LONG").is_some();
+    for case in cases().expect("cases").iter().filter(|case| long || ["terrain-100", "lens-s3", "all-effects"].contains(&case.name)) {
+        let mut sequence = (*case.sequence).clone();
+        resize(&mut sequence.scenario, [160, 120]);
+        let predicted = |max_error_dn: f64| {
+            let mut sequence = sequence.clone();
+            sequence.scenario.quality = QualitySpec { max_error_dn, ..QualitySpec::default() };
+            let plan = Planner::new(Arc::new(sequence), &[Channel::Color], 16_384).expect("a planner").plan(FRAME).expect("a plan");
+            (plan.predicted.levels_kept, plan.predicted.picture_dn())
+        };
+        let all = [2.0, 1.0, 0.7, 0.5, 0.4, 0.3, 0.2, 0.1, 0.01].map(|max_error_dn| (max_error_dn, predicted(max_error_dn)));
+        let least_dn = all.iter().map(|(_, (_, dn))| *dn).fold(f64::INFINITY, f64::min);
+        let is_off = |(max_error_dn, (kept, dn)): &&(f64, (bool, f64))| if *kept { dn > max_error_dn } else { *dn > NEAR_THE_BEST * least_dn };
+        let off: Vec<_> = all.iter().filter(is_off).collect();
+        assert!(off.is_empty(), "{}: the least is {least_dn}, and {off:?} of {all:?}", case.name);
+        assert!(all.iter().any(|(_, (kept, _))| !kept), "{}: everything is kept", case.name);
+    }
+}
+
 /// What silhouettes cost that are left as the ideal frame's pixels show them, away from and at them.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]

@@ -42,10 +42,10 @@ const EITHER_SAMPLES_MS: [f64; 2] = [6.0, 6.7];
 /// where a lens bends rows.
 const ANY_MS: [f64; 2] = [3.5, 0.6];
 const BENT_MS: [f64; 2] = [7.0, 4.0];
-/// Of rays at silhouettes: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes the rays themselves, and more
+/// Of rays at silhouettes: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes each of a pixel's rays, and more
 /// where their samples are coarse.
 const MARKS_MS: f64 = 10.0;
-const RAYS_MS: [f64; 2] = [500.0, 750.0];
+const RAYS_MS: [f64; 2] = [8.0, 12.0];
 
 /// What the triangles of a scene take to draw.
 #[derive(Clone, Copy, Debug)]
@@ -105,10 +105,10 @@ impl Prospect<'_> {
 
     /// Of giving pixels at silhouettes, which have a share of the picture, rays of their own: with so many fine pixels along a side of each ideal one, all
     /// triangles drawn once more.
-    pub fn rays_ms(&self, share: f64, scale: f64, fine: u32, ideal_share: f64) -> f64 {
+    pub fn rays_ms(&self, share: f64, scale: f64, fine: u32, rays: u32, ideal_share: f64) -> f64 {
         let finer = scale * f64::from(fine);
         let [least_ms, coarse_ms] = RAYS_MS;
-        ideal_share * (self.drawn.ms(finer) + finer * finer * MARKS_MS) + share * (least_ms + coarse_ms / finer)
+        ideal_share * (self.drawn.ms(finer) + finer * finer * MARKS_MS) + share * f64::from(rays) * (least_ms + coarse_ms / finer)
     }
 
     /// Over the places.

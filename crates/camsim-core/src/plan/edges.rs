@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{BlurStage, Contours, FramePlan, SIZE_QUANTUM_PX, Skip};
+use super::{Contours, FramePlan, SIZE_QUANTUM_PX, Skip};
 use crate::{
     pose::CameraPose,
     scenario::{QualitySpec, Silhouettes},
@@ -146,22 +146,22 @@ pub(super) struct EdgeCase<'a> {
     pub pose: &'a CameraPose,
     pub ideal: &'a crate::temporal::IdealGeometry,
     pub travel_m: f64,
-    pub blur: Option<BlurStage>,
     pub quality: &'a QualitySpec,
     pub max_side_px: u32,
     /// Why no silhouette can be in view, if none can.
     pub reason_for_none: Option<&'a str>,
     /// What silhouettes cost that are left as they are, if they are to be.
     pub plain: Option<&'a Contours>,
-    /// Fine pixels along a side of an ideal pixel.
+    /// Fine pixels along a side of an ideal pixel, and rays of an output pixel.
     pub fine: u32,
+    pub rays: u32,
     /// Whether depth and coordinates are wanted.
     pub truth: bool,
 }
 
 /// The edge stage of a frame.
 pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeStage {
-    let EdgeCase { outline, pose, ideal, blur, quality, max_side_px, plain, truth, .. } = *case;
+    let EdgeCase { outline, pose, ideal, quality, max_side_px, plain, truth, .. } = *case;
     let mut skip = |what, reason: String| skipped.push(Skip { what, reason });
     if let Some(reason) = case.reason_for_none {
         skip("silhouette supersampling", reason.to_owned());
@@ -180,7 +180,7 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
     let scale = most_fine(ideal.size_px, max_side_px).min(case.fine);
     // Ground is not thin. What is drawn in colour keeps its order of drawing.
     let thin = scale > 1 || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
-    EdgeStage::Supersampled { scale, samples: samples(scale, blur), thin }
+    EdgeStage::Supersampled { scale, samples: case.rays, thin }
 }
 
 /// Fine pixels along a side of an ideal pixel that there is memory for.
@@ -190,15 +190,6 @@ pub(super) fn most_fine(ideal_px: [u32; 2], max_side_px: u32) -> u32 {
         width.max(height) * scale <= u64::from(max_side_px) && width * height * scale * scale * FINE_PIXEL_BYTES <= MAX_FINE_BYTES
     };
     (2..=MOST_FINE).rev().find(|&scale| fits(u64::from(scale))).unwrap_or(1)
-}
-
-/// Measured at straight edges of full contrast (scale 2): 32 rays reach 39 dB without exposure; with it 32, 64 and 256 reach 35, 36 and 40 dB. A long path
-/// asks for as many as the plain gather takes. A power of two: only then are the rays' places even.
-fn samples(scale: u32, blur: Option<BlurStage>) -> u32 {
-    match blur {
-        None => (16 * scale).next_power_of_two(),
-        Some(blur) => (blur.max_samples * blur.stretches()).clamp(32 * scale, 256).next_power_of_two(),
-    }
 }
 
 impl Patch {

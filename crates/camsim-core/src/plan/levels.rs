@@ -38,7 +38,7 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
-const SAMPLES_PER_PX: [f64; 9] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
+const SAMPLES_PER_PX: [f64; 11] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
 /// Part of `quality.max_error_dn` that is kept for sources beside their place, a two-hundredth of its square root's; and the part of an error which is above that anyway.
 const KEPT_FOR_DISPLACED: f64 = 0.1;
 const OF_BROKEN: f64 = 0.3;
@@ -103,6 +103,8 @@ pub(super) struct Choice {
     /// RMS error over the picture, 1/255, what comes to it included, and whether that is within the tolerance.
     pub total_dn: f64,
     pub within: bool,
+    /// Where it is not: the least that any way of its kind has.
+    pub least_dn: f64,
 }
 
 impl Prospect<'_> {
@@ -187,7 +189,7 @@ impl Prospect<'_> {
             let expected = self.expected(&sampling, blur);
             Sampling { expected, ..sampling }
         };
-        let mut failed: Vec<(f64, Sampling)> = Vec::new();
+        let mut failed: Vec<Failed> = Vec::new();
         let mut cheapest: Option<(f64, f64, Sampling)> = None;
         for (least_cost, sampling) in ways {
             let below = cheapest.map_or(f64::INFINITY, |(price, ..)| price);
@@ -206,7 +208,7 @@ impl Prospect<'_> {
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
             let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
-                None => failed.push((total_dn, sampling)),
+                None => failed.push(Failed { sampling, beside_dn: beside_most_dn, roughly_dn: rough_dn, known_dn: tried.map(|_| total_dn) }),
                 Some(tried) => {
                     let priced = |samples: f64, dn: f64| price(cost(&way(sampling, samples)), dn);
                     // Fewer samples leave no less than the most.
@@ -218,21 +220,27 @@ impl Prospect<'_> {
                 }
             }
         }
-        let choice = |sampling: Sampling, total_dn: f64, within: bool| {
+        let choice = |sampling: Sampling, total_dn: f64, within: bool, least_dn: f64| {
             let price = self.price(&sampling, sampling.tried(quality, exposure), ideal_share);
-            Choice { sampling, price, total_dn, within }
+            Choice { sampling, price, total_dn, within, least_dn: least_dn.min(total_dn) }
         };
         if let Some((_, total_dn, sampling)) = cheapest {
-            return choice(sampling, total_dn, true);
+            return choice(sampling, total_dn, true, total_dn);
         }
         // The cheapest of those that come near the best, with no more samples than that takes.
-        let enough_dn = NEARLY * failed.iter().map(|(total_dn, _)| *total_dn).fold(f64::INFINITY, f64::min);
-        let none = (f64::INFINITY, Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
-        let (_, sampling) = failed.into_iter().find(|(total_dn, _)| *total_dn <= enough_dn).unwrap_or(none);
+        let exactly_dn = |failed: &Failed| {
+            let most = way(failed.sampling, choices(failed.sampling.scale).last().copied().unwrap_or(0.0));
+            self.expected(&most.0, most.1).total_dn().hypot(failed.beside_dn)
+        };
+        let least_dn = least_dn(&mut failed, &exactly_dn);
+        let enough_dn = NEARLY * least_dn;
+        let is_near = |failed: &mut Failed| failed.at_least_dn() <= enough_dn && failed.found_dn(&exactly_dn) <= enough_dn;
+        let nearest = failed.iter_mut().find_map(|failed| is_near(failed).then_some(failed.sampling));
+        let sampling = nearest.unwrap_or(Sampling::new(least_scale, SurfaceReads::Grid, TapStage::Spline));
         let of = |way: (Sampling, Option<BlurStage>)| {
             let sampling = exactly(way);
             let beside_dn = beside_dn(&way.0, way.1).unwrap_or(f64::INFINITY);
-            choice(sampling, sampling.expected.total_dn().hypot(beside_dn), false)
+            choice(sampling, sampling.expected.total_dn().hypot(beside_dn), false, least_dn)
         };
         let tried: Vec<Choice> = choices(sampling.scale).into_iter().map(|samples| of(way(sampling, samples))).collect();
         let most = tried.last().copied();
@@ -270,7 +278,8 @@ impl Prospect<'_> {
         let expected = self.expected(sampling, blur);
         let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
         let price = self.price(sampling, blur, task.ideal_share);
-        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within: total_dn <= for_sampling_dn(task.quality) }
+        let within = total_dn <= for_sampling_dn(task.quality);
+        Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within, least_dn: total_dn }
     }
 
     /// Ways of reading the ideal frame at a scale.
@@ -295,6 +304,42 @@ impl Prospect<'_> {
             }
         }
     }
+}
+
+/// A way of sampling that does not keep the tolerance, with the most samples.
+struct Failed {
+    sampling: Sampling,
+    /// What comes to its error.
+    beside_dn: f64,
+    /// Error as a few places tell it, and as all do, if they were asked.
+    roughly_dn: f64,
+    known_dn: Option<f64>,
+}
+
+impl Failed {
+    fn at_least_dn(&self) -> f64 {
+        self.known_dn.unwrap_or(SURE * self.roughly_dn)
+    }
+
+    fn found_dn(&mut self, exactly_dn: &dyn Fn(&Failed) -> f64) -> f64 {
+        let found_dn = self.known_dn.unwrap_or_else(|| exactly_dn(self));
+        self.known_dn = Some(found_dn);
+        found_dn
+    }
+}
+
+/// The least error of all: those that may be better than the best known are looked at, the most promising first.
+fn least_dn(failed: &mut [Failed], exactly_dn: &dyn Fn(&Failed) -> f64) -> f64 {
+    let mut order: Vec<&mut Failed> = failed.iter_mut().collect();
+    order.sort_by(|a, b| a.at_least_dn().total_cmp(&b.at_least_dn()));
+    let mut least_dn = f64::INFINITY;
+    for failed in order {
+        if failed.at_least_dn() >= least_dn {
+            break;
+        }
+        least_dn = least_dn.min(failed.found_dn(exactly_dn));
+    }
+    least_dn
 }
 
 /// Samples of a pixel whose path is so long, if it is equally long in each of its stretches.

@@ -13,6 +13,10 @@ use crate::scenario::{Auto, Silhouettes};
 /// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost less than finer ones.
 const MOST_SCALE_WITH_RAYS: f64 = 2.83;
 
+/// Rays a pixel of an exposure where `quality.blur_samples` says how many samples it has.
+const LEAST_RAYS_BY_HAND: u32 = 32;
+const MOST_RAYS_BY_HAND: u32 = 256;
+
 /// What was chosen.
 pub(super) struct Picture {
     pub sampling: Sampling,
@@ -21,6 +25,7 @@ pub(super) struct Picture {
     /// Whether they are left as they are, and if not, fine pixels along a side of each ideal one.
     pub is_plain: bool,
     pub fine: u32,
+    pub rays: u32,
     pub price: Price,
     /// RMS error over the picture as far as that is expected, 1/255 of the linear range.
     pub total_dn: f64,
@@ -32,8 +37,8 @@ impl Picture {
         self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn)
     }
 
-    fn of(choice: &Choice, silhouettes: Option<Contours>, is_plain: bool, fine: u32) -> Self {
-        Self { sampling: choice.sampling, silhouettes, is_plain, fine, price: choice.price, total_dn: choice.total_dn }
+    fn of(choice: &Choice, silhouettes: Option<Contours>, is_plain: bool, [fine, rays]: [u32; 2]) -> Self {
+        Self { sampling: choice.sampling, silhouettes, is_plain, fine, rays, price: choice.price, total_dn: choice.total_dn }
     }
 }
 
@@ -46,6 +51,7 @@ impl Look<'_> {
                 silhouettes: None,
                 is_plain: true,
                 fine: 1,
+                rays: 0,
                 price: Price::default(),
                 total_dn: 0.0,
             };
@@ -66,7 +72,7 @@ impl Look<'_> {
         let Some(outlook) = outlook else {
             let usual = |sampling: &Sampling, _| is_up_to(MOST_SCALE, sampling.scale, &task).then_some(layers_dn);
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
-            return Picture::of(&choice, None, false, 1);
+            return Picture::of(&choice, None, false, [1, 0]);
         };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
@@ -76,12 +82,16 @@ impl Look<'_> {
             }),
         };
         let plain = || plain_if(&|plain| quality.silhouettes == Silhouettes::Plain || plain.are_affordable(max_error_dn));
+        let rays = |scale: f64, fine: u32| match (quality.blur_samples, task.exposure) {
+            (Auto::Value(samples), Some(_)) => samples.clamp(LEAST_RAYS_BY_HAND * fine, MOST_RAYS_BY_HAND).next_power_of_two(),
+            _ => outlook.rays(scale, fine),
+        };
         let with_rays = || {
             let most_fine = |scale: f64| {
                 let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
                 edges::most_fine(size_px, self.planner.max_side_px)
             };
-            with_rays(prospect, &task, outlook, layers_dn, &most_fine)
+            WithRays { prospect, task: &task, outlook, layers_dn, most_fine: &most_fine, rays: &rays }.choose()
         };
         let (choice, is_plain, fine) = match quality.silhouettes {
             Silhouettes::Plain => (plain(), true, 1),
@@ -89,7 +99,7 @@ impl Look<'_> {
             Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
-                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, task.ideal_share) {
+                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, rays(task.least_scale, 1), task.ideal_share) {
                     (plain, true, 1)
                 } else {
                     let (with_rays, fine) = with_rays();
@@ -105,8 +115,9 @@ impl Look<'_> {
             }
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
-        let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine) });
-        Picture::of(&choice, silhouettes, is_plain, fine)
+        let rays = rays(sampling.scale, fine);
+        let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine, rays) });
+        Picture::of(&choice, silhouettes, is_plain, [fine, rays])
     }
 
     /// Scale from which on the ideal frame is too large.
@@ -126,7 +137,7 @@ impl Look<'_> {
 
 /// Whether one is the better choice: within the tolerance, or where neither is, near the least error that there is; and of two that are, the cheaper one.
 fn is_better(one: &Choice, other: &Choice) -> bool {
-    let least_dn = one.total_dn.min(other.total_dn);
+    let least_dn = one.least_dn.min(other.least_dn);
     let is_good = |choice: &Choice| if one.within || other.within { choice.within } else { choice.total_dn <= NEARLY * least_dn };
     is_good(one) && (!is_good(other) || one.price.ms < other.price.ms)
 }
@@ -136,28 +147,47 @@ fn is_up_to(most_scale: f64, scale: f64, task: &Task<'_>) -> bool {
     scale <= task.least_scale.max(most_scale) || task.quality.ideal_scale.value().is_some()
 }
 
-/// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
-/// that these are for what the finest ideal frame does not do.
-fn with_rays(prospect: &Prospect<'_>, task: &Task<'_>, outlook: &Outlook, layers_dn: f64, most_fine: &dyn Fn(f64) -> u32) -> (Choice, u32) {
-    let choose = |fine: u32| {
+/// Pictures whose silhouettes have rays of their own.
+struct WithRays<'a> {
+    prospect: &'a Prospect<'a>,
+    task: &'a Task<'a>,
+    outlook: &'a Outlook,
+    layers_dn: f64,
+    /// Most fine pixels along a side of an ideal one, and rays a pixel, by the ideal frame's scale.
+    most_fine: &'a dyn Fn(f64) -> u32,
+    rays: &'a dyn Fn(f64, u32) -> u32,
+}
+
+impl WithRays<'_> {
+    /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
+    /// that these are for what the finest ideal frame does not do.
+    fn choose(&self) -> (Choice, u32) {
+        let mut failed = Vec::new();
+        for fine in 1..=edges::MOST_FINE {
+            let choice = self.choose_of(fine);
+            if choice.within {
+                return (choice, fine);
+            }
+            failed.push((choice, fine));
+        }
+        let least_dn = failed.iter().map(|(choice, _)| choice.least_dn).fold(f64::INFINITY, f64::min);
+        let near = failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn);
+        near.map_or_else(|| (self.choose_of(1), 1), |(choice, fine)| (Choice { least_dn, ..choice }, fine))
+    }
+
+    fn choose_of(&self, fine: u32) -> Choice {
+        let Self { prospect, task, outlook, layers_dn, most_fine, rays } = *self;
         let most_scale = if fine == 1 { MOST_SCALE_WITH_RAYS } else { MOST_SCALE };
         let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
-        let choice = prospect
-            .choose(task, &|sampling, blur| may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine).error_dn.hypot(layers_dn)));
-        let rays_ms = prospect.rays_ms(outlook.share, choice.sampling.scale, fine, task.ideal_share);
+        let choice = prospect.choose(task, &|sampling, blur| {
+            let rays = rays(sampling.scale, fine);
+            may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine, rays).error_dn.hypot(layers_dn))
+        });
+        let scale = choice.sampling.scale;
+        let rays_ms = prospect.rays_ms(outlook.share, scale, fine, rays(scale, fine), task.ideal_share);
         let price = Price { ms: choice.price.ms + rays_ms, ..choice.price };
-        (Choice { price, ..choice }, fine)
-    };
-    let mut failed = Vec::new();
-    for fine in 1..=edges::MOST_FINE {
-        let (choice, fine) = choose(fine);
-        if choice.within {
-            return (choice, fine);
-        }
-        failed.push((choice, fine));
+        Choice { price, ..choice }
     }
-    let least_dn = failed.iter().map(|(choice, _)| choice.total_dn).fold(f64::INFINITY, f64::min);
-    failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn).unwrap_or_else(|| choose(1))
 }
 
 #[cfg(test)]
@@ -171,12 +201,18 @@ mod tests {
             price: Price { ms, ..Price::default() },
             total_dn,
             within,
+            least_dn: total_dn,
         };
         let cases = [
             ("the dear one keeps it", choice(0.9, true, 50.0), choice(1.1, false, 10.0)),
             ("both keep it", choice(0.9, true, 10.0), choice(0.3, true, 50.0)),
             ("none does, and the cheap one is far off", choice(0.60, false, 50.0), choice(0.95, false, 10.0)),
             ("none does, and both are near", choice(0.65, false, 10.0), choice(0.60, false, 50.0)),
+            (
+                "none does, and the cheap one is not near the least that the other could be",
+                Choice { least_dn: 0.70, ..choice(0.78, false, 50.0) },
+                choice(0.88, false, 10.0),
+            ),
         ];
         for (what, better, worse) in cases {
             assert!(is_better(&better, &worse) && !is_better(&worse, &better), "{what}");
