@@ -201,9 +201,11 @@ fn a_picture_beyond_its_tolerance_fails_and_what_nobody_foretold_is_named() {
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
     let frame = &report["frames"][0];
     assert!(code == 1 && report["kept"] == false && frame["kept"] == true && frame["picture"]["kept"] == false, "{out}");
-    // Sources may be anywhere, and the prediction for the picture knows nothing of it.
+    // Sources may be anywhere, and the prediction for the picture knows what that costs.
     let (_, out, err) = verify(&["--set", "quality.solver=linear", "--set", "quality.max_error_px=100"]);
-    assert!(out.contains("not in that prediction: what is seen up to"), "{out}{err}");
+    assert!(out.contains("is BROKEN as predicted") && !out.contains("not in that prediction"), "{out}{err}");
+    let (_, out, err) = verify(&["--preset", "paper"]);
+    assert!(out.contains("not in that prediction: vignette, fog and stored colours"), "{out}{err}");
 }
 
 #[test]

@@ -187,7 +187,7 @@ pub struct QualitySpec {
     pub preset: Preset,
     /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
     pub max_error_px: f64,
-    /// RMS bound in 1/255 of linear range, from blur sampling and resampling.
+    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place and at silhouettes.
     pub max_error_dn: f64,
     /// Bound on the terrain level of detail, reported apart.
     pub max_terrain_error_px: f64,

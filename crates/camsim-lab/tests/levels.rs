@@ -155,7 +155,8 @@ fn a_tighter_tolerance_makes_no_worse_picture() {
         };
         let all = [2.0, 1.0, 0.7, 0.5, 0.4, 0.3, 0.2, 0.1, 0.01].map(|max_error_dn| (max_error_dn, predicted(max_error_dn)));
         let least_dn = all.iter().map(|(_, (_, dn))| *dn).fold(f64::INFINITY, f64::min);
-        let is_off = |(max_error_dn, (kept, dn)): &&(f64, (bool, f64))| if *kept { dn > max_error_dn } else { *dn > NEAR_THE_BEST * least_dn };
+        let is_off =
+            |(max_error_dn, (kept, dn)): &&(f64, (bool, f64))| if *kept { dn > max_error_dn } else { *dn > NEAR_THE_BEST * least_dn };
         let off: Vec<_> = all.iter().filter(is_off).collect();
         assert!(off.is_empty(), "{}: the least is {least_dn}, and {off:?} of {all:?}", case.name);
         assert!(all.iter().any(|(_, (kept, _))| !kept), "{}: everything is kept", case.name);

@@ -38,8 +38,7 @@ const TIMES_AT: f64 = 6.0;
 /// Part of what stairs cost, squared, that rays leave of it; and how sure what is known of rays is, which was found with a look once a pixel.
 const RAYS_LEAVE: f64 = 0.42;
 const SAFETY_WITH_RAYS: f64 = 1.2;
-/// Part of that, squared, that too few rays may add; and how many there may be, as powers of two: only then are their places even.
-const OF_RAYS: f64 = 0.3;
+/// How many rays there may be, as powers of two: only then are their places even. Over an exposure twice as many at least.
 const LEAST_RAYS: u32 = 4;
 const MOST_RAYS: u32 = 8;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
@@ -193,10 +192,11 @@ impl Outlook {
         self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
     }
 
-    /// Rays a pixel: as many as make hardly more of the error than the samples that they go through.
-    pub fn rays(&self, scale: f64, fine: u32) -> u32 {
-        let enough = |rays: &u32| self.places.missed_by_rays(*rays) <= OF_RAYS * self.left_by_samples(scale, fine);
-        (LEAST_RAYS..MOST_RAYS).map(|log2| 1 << log2).find(enough).unwrap_or(1 << MOST_RAYS)
+    /// Rays a pixel: the fewest that add no more than a part of the error, squared, that the samples leave which they go through.
+    pub fn rays(&self, scale: f64, fine: u32, most_part: f64) -> u32 {
+        let enough = |rays: &u32| self.places.missed_by_rays(*rays) <= most_part * self.left_by_samples(scale, fine);
+        let least = LEAST_RAYS + u32::from(self.places.move_on());
+        (least..MOST_RAYS).map(|log2| 1 << log2).find(enough).unwrap_or(1 << MOST_RAYS)
     }
 
     fn left_by_samples(&self, scale: f64, fine: u32) -> f64 {
@@ -428,7 +428,7 @@ pub(super) mod tests {
         let expected = UNSURE_OF_ALL * SAFETY * SAFETY / 4.0;
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.steps, 0.0);
-        let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2, 256)].map(|of| of.error_dn);
+        let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2, u32::MAX)].map(|of| of.error_dn);
         let left = stairs::left(&stairs::Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
         let rays_alike = rays * SAFETY / SAFETY_WITH_RAYS / found.once_a_pixel.sqrt();
         assert!((plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
@@ -449,7 +449,7 @@ pub(super) mod tests {
             once_a_pixel: 1.0,
             places,
         };
-        let with_rays = |fine: u32| feet.with_rays(&read_at(2.0), None, fine, 256).error_dn;
+        let with_rays = |fine: u32| feet.with_rays(&read_at(2.0), None, fine, u32::MAX).error_dn;
         let less = SAFETY_WITH_RAYS / SAFETY;
         assert!((with_rays(1) / feet.plain(&read_at(2.0), None).error_dn - less).abs() < 1e-12);
         // Of 1/12 in a pixel's width, in pixels half as wide.
@@ -487,7 +487,7 @@ pub(super) mod tests {
         assert!(blurred.at_dn < 0.9 * coarse, "{} {coarse}", blurred.at_dn);
         // White on black costs more than a 255th; nothing is left of it.
         assert!(!blurred.are_affordable(1.0) && blurred.are_affordable(16.0), "{blurred:?}");
-        let with_rays = |scale: f64, fine: u32| still.with_rays(&spline(scale), None, fine, 256);
+        let with_rays = |scale: f64, fine: u32| still.with_rays(&spline(scale), None, fine, u32::MAX);
         assert!(with_rays(1.0, 1).error_dn < still.plain(&spline(1.0), None).error_dn);
         assert_eq!(with_rays(2.0, 1), with_rays(1.0, 2));
         // What nothing can leave less of lets nobody think that more would be left.

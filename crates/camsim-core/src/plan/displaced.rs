@@ -47,12 +47,13 @@ impl ShownWaves {
     /// RMS error over the picture, 1/255 of the linear range, of sources that are so far off, pixels of the camera.
     pub fn displaced_dn(&self, px: impl ExactSizeIterator<Item = f64>) -> f64 {
         let count = px.len().max(1) as f64;
-        SAFETY * 255.0 * (px.map(|px| self.displaced2(px)).sum::<f64>() / count).sqrt()
+        // Of nothing at all `sum` is -0.
+        SAFETY * 255.0 * (px.fold(0.0, |sum, px| sum + self.displaced2(px)) / count).sqrt()
     }
 
     /// Mean squared error of a pixel whose source is so far off, of the linear range.
     fn displaced2(&self, px: f64) -> f64 {
-        self.rings.iter().map(|(cycles, power)| power * moved2(TAU * cycles * px)).sum()
+        self.rings.iter().fold(0.0, |sum, (cycles, power)| sum + power * moved2(TAU * cycles * px))
     }
 }
 

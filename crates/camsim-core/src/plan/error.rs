@@ -172,8 +172,8 @@ fn missed_px(case: &Case<'_>, predicted: &Predicted) -> Option<[f64; 2]> {
         return Some([nodes_px, max_error_px]);
     }
     // Grey levels follow the displacement.
-    let share_of_allowed = case.most_displaced_dn / predicted.displaced_dn;
-    (share_of_allowed < 1.0 && nodes_px > OF_NODES * predicted.total_px).then_some([nodes_px, share_of_allowed * nodes_px])
+    let is_broken = predicted.displaced_dn > case.most_displaced_dn && nodes_px > OF_NODES * predicted.total_px;
+    is_broken.then(|| [nodes_px, nodes_px * case.most_displaced_dn / predicted.displaced_dn])
 }
 
 impl<'a> Case<'a> {

@@ -208,7 +208,9 @@ impl Prospect<'_> {
             let tried = Some(most).filter(|_| rough_dn <= FAR * max_error_dn).map(exactly);
             let total_dn = tried.as_ref().map_or(rough_dn, |sampling| sampling.expected.total_dn().hypot(beside_most_dn));
             match tried.filter(|_| total_dn <= max_error_dn) {
-                None => failed.push(Failed { sampling, beside_dn: beside_most_dn, roughly_dn: rough_dn, known_dn: tried.map(|_| total_dn) }),
+                None => {
+                    failed.push(Failed { sampling, beside_dn: beside_most_dn, roughly_dn: rough_dn, known_dn: tried.map(|_| total_dn) })
+                }
                 Some(tried) => {
                     let priced = |samples: f64, dn: f64| price(cost(&way(sampling, samples)), dn);
                     // Fewer samples leave no less than the most.

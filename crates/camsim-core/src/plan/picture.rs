@@ -17,6 +17,10 @@ const MOST_SCALE_WITH_RAYS: f64 = 2.83;
 const LEAST_RAYS_BY_HAND: u32 = 32;
 const MOST_RAYS_BY_HAND: u32 = 256;
 
+/// Part of what samples leave of borders, squared, that their rays may add: where that does, and where it does not.
+const FEW_ADD: f64 = 0.3;
+const MANY_ADD: f64 = 0.03;
+
 /// What was chosen.
 pub(super) struct Picture {
     pub sampling: Sampling,
@@ -82,42 +86,42 @@ impl Look<'_> {
             }),
         };
         let plain = || plain_if(&|plain| quality.silhouettes == Silhouettes::Plain || plain.are_affordable(max_error_dn));
-        let rays = |scale: f64, fine: u32| match (quality.blur_samples, task.exposure) {
+        let rays = |scale: f64, &Rays { fine, most_part }: &Rays| match (quality.blur_samples, task.exposure) {
             (Auto::Value(samples), Some(_)) => samples.clamp(LEAST_RAYS_BY_HAND * fine, MOST_RAYS_BY_HAND).next_power_of_two(),
-            _ => outlook.rays(scale, fine),
+            _ => outlook.rays(scale, fine, most_part),
         };
         let with_rays = || {
             let most_fine = |scale: f64| {
                 let size_px = scenery.ideal.size_px.map(|side| (f64::from(side) * scale / task.least_scale) as u32);
                 edges::most_fine(size_px, self.planner.max_side_px)
             };
-            WithRays { prospect, task: &task, outlook, layers_dn, most_fine: &most_fine, rays: &rays }.choose()
+            WithRays { prospect, task: &task, outlook, layers_dn, most_fine: &most_fine, count: &rays }.choose()
         };
-        let (choice, is_plain, fine) = match quality.silhouettes {
-            Silhouettes::Plain => (plain(), true, 1),
+        let (choice, kind) = match quality.silhouettes {
+            Silhouettes::Plain => (plain(), None),
             // Another instant sees more of what is behind a silhouette than rays could make up for.
-            Silhouettes::Auto if self.common.is_some() => (plain(), true, 1),
+            Silhouettes::Auto if self.common.is_some() => (plain(), None),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
                 let plain = plain();
-                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, rays(task.least_scale, 1), task.ideal_share) {
-                    (plain, true, 1)
+                let fewest = rays(task.least_scale, &Rays::FEWEST);
+                if plain.within && plain.price.ms < prospect.rays_ms(outlook.share, task.least_scale, 1, fewest, task.ideal_share) {
+                    (plain, None)
                 } else {
-                    let (with_rays, fine) = with_rays();
+                    let (with_rays, kind) = with_rays();
                     // Where nothing keeps the tolerance silhouettes may take all of it.
                     let plain = if plain.within || with_rays.within { plain } else { plain_if(&|_| true) };
-                    let is_plain = is_better(&plain, &with_rays);
-                    (if is_plain { plain } else { with_rays }, is_plain, fine)
+                    if is_better(&plain, &with_rays) { (plain, None) } else { (with_rays, Some(kind)) }
                 }
             }
             Silhouettes::Auto | Silhouettes::Rays => {
-                let (with_rays, fine) = with_rays();
-                (with_rays, false, fine)
+                let (with_rays, kind) = with_rays();
+                (with_rays, Some(kind))
             }
         };
         let (sampling, blur) = (&choice.sampling, choice.sampling.tried(quality, task.exposure));
-        let rays = rays(sampling.scale, fine);
-        let silhouettes = Some(if is_plain { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine, rays) });
-        Picture::of(&choice, silhouettes, is_plain, [fine, rays])
+        let (fine, rays) = kind.map_or((1, 0), |kind| (kind.fine, rays(sampling.scale, &kind)));
+        let silhouettes = Some(if rays == 0 { outlook.plain(sampling, blur) } else { outlook.with_rays(sampling, blur, fine, rays) });
+        Picture::of(&choice, silhouettes, rays == 0, [fine, rays])
     }
 
     /// Scale from which on the ideal frame is too large.
@@ -147,44 +151,62 @@ fn is_up_to(most_scale: f64, scale: f64, task: &Task<'_>) -> bool {
     scale <= task.least_scale.max(most_scale) || task.quality.ideal_scale.value().is_some()
 }
 
+/// A kind of rays at silhouettes.
+#[derive(Clone, Copy)]
+struct Rays {
+    /// Fine pixels along a side of an ideal one.
+    fine: u32,
+    /// Part of the error, squared, that too few of them may add.
+    most_part: f64,
+}
+
+impl Rays {
+    const FEWEST: Self = Self { fine: 1, most_part: FEW_ADD };
+
+    /// In the order in which they are tried: more pixels cost less than finer ones, so that these are for what the finest ideal frame does not do.
+    fn all() -> impl Iterator<Item = Self> {
+        (1..=edges::MOST_FINE).flat_map(|fine| [FEW_ADD, MANY_ADD].map(|most_part| Self { fine, most_part }))
+    }
+}
+
 /// Pictures whose silhouettes have rays of their own.
 struct WithRays<'a> {
     prospect: &'a Prospect<'a>,
     task: &'a Task<'a>,
     outlook: &'a Outlook,
     layers_dn: f64,
-    /// Most fine pixels along a side of an ideal one, and rays a pixel, by the ideal frame's scale.
+    /// By the ideal frame's scale, most fine pixels along a side of an ideal one, and rays a pixel.
     most_fine: &'a dyn Fn(f64) -> u32,
-    rays: &'a dyn Fn(f64, u32) -> u32,
+    count: &'a dyn Fn(f64, &Rays) -> u32,
 }
 
 impl WithRays<'_> {
-    /// The coarsest fine pixels with which rays keep the tolerance, or come near the best they could. More pixels cost less than finer ones, so
-    /// that these are for what the finest ideal frame does not do.
-    fn choose(&self) -> (Choice, u32) {
+    /// The first kind of rays with which a picture keeps the tolerance, or comes near the best there is.
+    fn choose(&self) -> (Choice, Rays) {
         let mut failed = Vec::new();
-        for fine in 1..=edges::MOST_FINE {
-            let choice = self.choose_of(fine);
+        for rays in Rays::all() {
+            let choice = self.choose_of(rays);
             if choice.within {
-                return (choice, fine);
+                return (choice, rays);
             }
-            failed.push((choice, fine));
+            failed.push((choice, rays));
         }
         let least_dn = failed.iter().map(|(choice, _)| choice.least_dn).fold(f64::INFINITY, f64::min);
         let near = failed.into_iter().find(|(choice, _)| choice.total_dn <= NEARLY * least_dn);
-        near.map_or_else(|| (self.choose_of(1), 1), |(choice, fine)| (Choice { least_dn, ..choice }, fine))
+        near.map_or_else(|| (self.choose_of(Rays::FEWEST), Rays::FEWEST), |(choice, rays)| (Choice { least_dn, ..choice }, rays))
     }
 
-    fn choose_of(&self, fine: u32) -> Choice {
-        let Self { prospect, task, outlook, layers_dn, most_fine, rays } = *self;
+    fn choose_of(&self, rays: Rays) -> Choice {
+        let Self { prospect, task, outlook, layers_dn, most_fine, count } = *self;
+        let fine = rays.fine;
         let most_scale = if fine == 1 { MOST_SCALE_WITH_RAYS } else { MOST_SCALE };
         let may = |scale: f64| fine <= most_fine(scale) && is_up_to(most_scale, scale, task);
         let choice = prospect.choose(task, &|sampling, blur| {
-            let rays = rays(sampling.scale, fine);
-            may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine, rays).error_dn.hypot(layers_dn))
+            let count = count(sampling.scale, &rays);
+            may(sampling.scale).then(|| outlook.with_rays(sampling, blur, fine, count).error_dn.hypot(layers_dn))
         });
         let scale = choice.sampling.scale;
-        let rays_ms = prospect.rays_ms(outlook.share, scale, fine, rays(scale, fine), task.ideal_share);
+        let rays_ms = prospect.rays_ms(outlook.share, scale, fine, count(scale, &rays), task.ideal_share);
         let price = Price { ms: choice.price.ms + rays_ms, ..choice.price };
         Choice { price, ..choice }
     }

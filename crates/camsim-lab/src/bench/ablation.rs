@@ -1,18 +1,23 @@
-//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left.
+//! What each effect of a whole camera costs: left out in turn, and one after the other until nothing is left; as plans make it, and with the sampling of the whole camera
+//! held. An effect can hide what is wrong with a picture: without blur, vignette or lens it takes a finer one to keep `quality.max_error_dn`, so that plans may spend more
+//! time where less is to be done. What the effect itself takes is the difference that is left when pictures are sampled alike.
 
 use std::sync::Arc;
 
 use camsim_core::{
     mount::{CameraPath, MountError},
-    scenario::{LensSpec, ShutterSpec, Silhouettes},
+    plan::{FramePlan, Planner},
+    scenario::{Auto, Channel, LensSpec, QualitySpec, ShutterSpec, Silhouettes},
     sequence::Sequence,
+    temporal::TapStage,
 };
 use camsim_gpu::Engine;
 use serde::Serialize;
 
 use super::{
     BenchError, blit,
-    rounds::{self, Effort, Times},
+    knobs::MAX_SIDE_PX,
+    rounds::{self, Effort, FRAME, Times},
 };
 use crate::timing::quartiles;
 
@@ -90,6 +95,30 @@ pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>,
     Ok(Arc::new(sequence))
 }
 
+/// The sampling of a plan, whatever it leaves of a picture; each frame from an ideal frame of its own.
+fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
+    let taps = match plan.taps {
+        TapStage::Bilinear | TapStage::Spline => 1,
+        TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
+    };
+    QualitySpec {
+        ideal_scale: Auto::Value(plan.ideal.focal_px.x / plan.camera.focal_px.x),
+        footprint_taps: Auto::Value(taps),
+        blur_samples: plan.blur.map_or(Auto::Auto, |blur| Auto::Value(blur.max_samples * blur.stretches())),
+        silhouettes: if plan.edges.has_rays() && quality.silhouettes != Silhouettes::Plain {
+            Silhouettes::Rays
+        } else {
+            Silhouettes::Plain
+        },
+        frames_per_ideal: 1,
+        max_error_dn: ANY_DN,
+        ..quality.clone()
+    }
+}
+
+/// A tolerance that chooses nothing.
+const ANY_DN: f64 = 255.0;
+
 /// One row of the ablation.
 #[derive(Clone, Debug, Serialize)]
 pub struct AblationRow {
@@ -101,6 +130,12 @@ pub struct AblationRow {
     pub cpu_ms_per_frame: Option<f64>,
     /// Difference to the whole camera in the same round, quartiles, ms; null for the copy, which is measured apart.
     pub to_full_ms: Option<[f64; 3]>,
+    /// The same three of frames that are sampled as the plan samples the whole camera's.
+    pub alike_ms_per_frame_p50: Option<f64>,
+    /// See above.
+    pub alike_cpu_ms_per_frame: Option<f64>,
+    /// See above.
+    pub alike_to_full_ms: Option<[f64; 3]>,
 }
 
 /// Times of a camera without each effect, without more and more of them, without any over a picture that is kept, and of a bare copy.
@@ -128,16 +163,48 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
     }
     names.push("a perfect camera that stands still: its ideal frame is kept".to_owned());
     variants.push((without(full, &EFFECTS)?, true));
-    let times: Vec<Times> = rounds::measure(engine, &variants, effort)?.into_iter().map(|measured| measured.times).collect();
-    let mut rows: Vec<_> = names.into_iter().zip(&times).map(|(name, own)| row(name, own, Some(&times[0]))).collect();
-    let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, times[0].wall_ms.len().max(3), effort.burst)?;
-    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None));
+    let planned = times(engine, &variants, effort)?;
+    let plan = Planner::new(full.clone(), &[Channel::Color], MAX_SIDE_PX).and_then(|planner| planner.plan(FRAME));
+    let alike = match &plan {
+        Ok(plan) => times(engine, &alike(&variants, plan), effort)?.into_iter().map(Some).collect(),
+        // The renderer has made it: this cannot be.
+        Err(_) => vec![None; planned.len()],
+    };
+    let full_alike = alike.first().cloned().flatten();
+    let rows = names.into_iter().zip(planned.iter().zip(&alike));
+    let mut rows: Vec<_> =
+        rows.map(|(name, (own, alike))| row(name, own, Some(&planned[0]), alike.as_ref().zip(full_alike.as_ref()))).collect();
+    let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, planned[0].wall_ms.len().max(3), effort.burst)?;
+    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None, None));
     Ok(rows)
 }
 
-fn row(without: String, own: &Times, full: Option<&Times>) -> AblationRow {
-    let to_full_ms = full.map(|full| quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>()));
-    AblationRow { without, ms_per_frame_p50: own.p50_p99_ms()[0], cpu_ms_per_frame: own.processor_p50_ms(), to_full_ms }
+fn times(engine: &Engine, variants: &[(Arc<Sequence>, bool)], effort: Effort) -> Result<Vec<Times>, BenchError> {
+    Ok(rounds::measure(engine, variants, effort)?.into_iter().map(|measured| measured.times).collect())
+}
+
+/// The same, sampled as `plan` is.
+fn alike(variants: &[(Arc<Sequence>, bool)], plan: &FramePlan) -> Vec<(Arc<Sequence>, bool)> {
+    let held = |(sequence, still): &(Arc<Sequence>, bool)| {
+        let mut sequence = (**sequence).clone();
+        sequence.scenario.quality = sampled_as(plan, &sequence.scenario.quality);
+        (Arc::new(sequence), *still)
+    };
+    variants.iter().map(held).collect()
+}
+
+fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times, &Times)>) -> AblationRow {
+    let difference =
+        |own: &Times, full: &Times| quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>());
+    AblationRow {
+        without,
+        ms_per_frame_p50: own.p50_p99_ms()[0],
+        cpu_ms_per_frame: own.processor_p50_ms(),
+        to_full_ms: full.map(|full| difference(own, full)),
+        alike_ms_per_frame_p50: alike.map(|(own, _)| own.p50_p99_ms()[0]),
+        alike_cpu_ms_per_frame: alike.and_then(|(own, _)| own.processor_p50_ms()),
+        alike_to_full_ms: alike.map(|(own, full)| difference(own, full)),
+    }
 }
 
 #[cfg(test)]

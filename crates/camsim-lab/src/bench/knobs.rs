@@ -14,10 +14,12 @@ use crate::cases::{Case, Group};
 pub const DEFAULT: &str = "auto 0.05 px";
 /// The case with every effect; its frames take long, and it has fewer rows of each kind.
 pub const WHOLE: &str = "all-effects";
+/// Its row for a finer picture.
+pub const FINE: &str = "auto 0.05 px, 0.7/255";
 /// The case whose size is varied.
 const SIZED: &str = "blender-plane";
 /// Largest texture side that the plan behind a rule of samples assumes.
-const MAX_SIDE_PX: u32 = 16_384;
+pub(super) const MAX_SIDE_PX: u32 = 16_384;
 
 /// What a row varies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +82,9 @@ pub fn variants(case: &Case, quick: bool) -> Vec<Variant> {
     }
     if quick {
         return rows;
+    }
+    if case.name == WHOLE {
+        row(FINE, Family::Tolerance, &|scenario| scenario.quality.max_error_dn = 0.7);
     }
     if case.has_houses() {
         if matches!(case.group, Group::Buildings | Group::LongWindow | Group::AllEffects) {

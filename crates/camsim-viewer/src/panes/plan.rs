@@ -110,6 +110,7 @@ fn levels(ui: &mut Ui, predicted: &Predicted) {
     fact(ui, "grey levels", format!("{:.3} of 255", predicted.picture_dn()), "expected RMS of the picture, all causes together");
     fact(ui, "resampling", format!("{:.3}", predicted.resampling_dn), "of the ideal frame, away from silhouettes");
     fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
+    fact(ui, "beside their place", format!("{:.3}", predicted.displaced_dn), "sources of pixels, away from silhouettes");
     if let Some(silhouettes) = predicted.silhouettes {
         fact(ui, "silhouettes", format!("{:.3}", silhouettes.error_dn), "as they are made: by the ideal frame's pixels or by rays");
     }
