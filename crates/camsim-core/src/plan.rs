@@ -283,7 +283,12 @@ impl Planner {
         let mut choice = error::choose(&case, &motion);
         for _ in 0..MOST_REFINEMENTS {
             let missed = choice.missed_px.filter(|_| demanded != Some(TemporalStage::Linear));
-            let Some(finer) = exposure.zip(missed).and_then(|(exposure, [px, most_px])| exposure.finer(px, most_px)) else { break };
+            let Some((before, [px, most_px])) = exposure.zip(missed) else { break };
+            // A vibration that the nodes were blind to asks for as many as it has periods.
+            let by_rule =
+                Some(look.exposed(motion, &tried).path_within(most_px)).filter(|rule| px > most_px && rule.steps() > before.steps());
+            let finer = by_rule.into_iter().chain(before.finer(px, most_px)).max_by_key(|finer| finer.steps());
+            let Some(finer) = finer else { break };
             exposure = Some(finer);
             case.blur = Some(look.blur_stage(finer, edges, &sampling, motion, &tried));
             choice = error::choose(&case, &motion);

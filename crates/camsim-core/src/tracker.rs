@@ -135,7 +135,7 @@ pub enum TrackerError {
     Overflow,
     /// The log is too long for the control rate.
     #[error(
-        "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate or shorten flight.window_s"
+        "{span_s:.0} s of flight log at tracker.rate_hz = {rate_hz} need {ticks:.0} control ticks, more than {MOST_TICKS}; lower the rate, raise flight.speed or leave rows out of the log"
     )]
     TooLong {
         /// Length of the log.

@@ -168,12 +168,11 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
 /// [`Choice::missed_px`].
 fn missed_px(case: &Case<'_>, predicted: &Predicted) -> Option<[f64; 2]> {
     let (max_error_px, nodes_px) = (case.sequence.scenario.quality.max_error_px, predicted.nodes_px);
-    if !predicted.kept {
-        return Some([nodes_px, max_error_px]);
-    }
     // Grey levels follow the displacement.
-    let is_broken = predicted.displaced_dn > case.most_displaced_dn && nodes_px > OF_NODES * predicted.total_px;
-    is_broken.then(|| [nodes_px, nodes_px * case.most_displaced_dn / predicted.displaced_dn])
+    let is_seen = predicted.displaced_dn > case.most_displaced_dn && nodes_px > OF_NODES * predicted.total_px;
+    let for_levels_px = is_seen.then(|| nodes_px * case.most_displaced_dn / predicted.displaced_dn);
+    let for_sources_px = (!predicted.kept).then_some(max_error_px);
+    for_levels_px.into_iter().chain(for_sources_px).reduce(f64::min).map(|most_px| [nodes_px, most_px])
 }
 
 impl<'a> Case<'a> {

@@ -55,6 +55,11 @@ impl ExposurePath {
         (miss_px > allowed_px && finer != Self { stride: 1, ..self }).then_some(finer)
     }
 
+    /// Steps from node to node.
+    pub fn steps(self) -> u32 {
+        self.stretches * self.path.steps()
+    }
+
     pub fn with_samples(self, samples_per_px: f64, max_samples: u32) -> BlurStage {
         let Self { path, stretches, stride } = self;
         let nodes = stretches * path.steps() * stride + 1;
@@ -76,25 +81,35 @@ pub(super) struct Exposed<'a> {
 impl Exposed<'_> {
     /// The path with the fewest nodes that is missed by no more than its share of the tolerance; `None` where the exposure does not show.
     pub fn path(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> Option<ExposurePath> {
+        self.shows(quality, skipped).then(|| self.path_within(quality.max_error_px))
+    }
+
+    /// Whether the exposure shows.
+    fn shows(&self, quality: &QualitySpec, skipped: &mut Vec<Skip>) -> bool {
         if self.shutter.exposure_s() <= 0.0 {
             skipped.push(Skip { what: "motion blur", reason: "camera.shutter.exposure_ms is 0".into() });
-            return None;
+            return false;
         }
         let blur_px = self.motion.blur_px;
         if blur_px <= quality.max_error_px.min(SHARP_PX) && quality.blur_samples == Auto::Auto {
             skipped.push(Skip { what: "motion blur", reason: format!("no path over the exposure is longer than {blur_px:.2e} px") });
-            return None;
+            return false;
         }
-        let allowed_px = SHARE * quality.max_error_px;
+        true
+    }
+
+    /// The path with the fewest nodes that is missed by no more than its share of a tolerance.
+    pub fn path_within(&self, max_error_px: f64) -> ExposurePath {
+        let allowed_px = SHARE * max_error_px;
         if self.motion.blur_sagitta_px <= allowed_px {
-            return Some(ExposurePath::STRAIGHT);
+            return ExposurePath::STRAIGHT;
         }
         let of_parabola = |stretches| self.miss_px(PathStage::Parabola, stretches);
         if LEAST_PER_PERIOD * self.periods() <= 2.0 && of_parabola(1) <= allowed_px {
-            return Some(ExposurePath { path: PathStage::Parabola, stretches: 1, stride: 1 });
+            return ExposurePath { path: PathStage::Parabola, stretches: 1, stride: 1 };
         }
         let path = PathStage::Quartic;
-        Some(ExposurePath { path, stretches: self.stretches(path, LEAST_PER_PERIOD, allowed_px), stride: 1 })
+        ExposurePath { path, stretches: self.stretches(path, LEAST_PER_PERIOD, allowed_px), stride: 1 }
     }
 
     /// With poses so near to each other that straight lines between them miss no more than the path does: rays at silhouettes take those.
@@ -159,6 +174,21 @@ impl Exposed<'_> {
 /// How many times more polynomials a path takes that is missed by more than is allowed.
 fn more_for(miss_px: f64, allowed_px: f64, steps: u32) -> f64 {
     (1.05 * miss_px / allowed_px).powf(f64::from(steps + 1).recip())
+}
+
+/// Whether nodes that are so many steps apart over an exposure of so many periods of the fastest vibration may all meet it alike.
+pub(super) fn may_alias(steps: u32, periods: f64) -> bool {
+    f64::from(steps) < LEAST_PER_PERIOD * periods
+}
+
+/// How far the path over the exposure is from its polynomials, given where it is at a share of the exposure (0 to 1): at one such share.
+pub(super) fn miss_at_px(path: PathStage, stretches: u32, share: f64, mut place: impl FnMut(f64) -> DVec2) -> f64 {
+    let along = share * f64::from(stretches);
+    let k = along.floor().min(f64::from(stretches) - 1.0);
+    let node = |j: u32| (k + f64::from(j) / f64::from(path.steps())) / f64::from(stretches);
+    let nodes: Vec<DVec2> = (0..=path.steps()).map(|j| place(node(j))).collect();
+    let px = Curve::through(&nodes).at((along - k) * f64::from(path.steps())).distance(place(share));
+    if px.is_finite() { px } else { 0.0 }
 }
 
 /// How far polynomial `k` of the path over the exposure is from the path itself, given where that is at a share of the exposure (0 to 1).

@@ -39,8 +39,9 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 11] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
-/// Part of `quality.max_error_dn` that is kept for sources beside their place, a two-hundredth of its square root's; and the part of an error which is above that anyway.
-const KEPT_FOR_DISPLACED: f64 = 0.1;
+/// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may take 0.995 of it; and of an error that is above it anyway the part
+/// that these may be.
+const LEFT_FOR_DISPLACED: f64 = 0.1;
 const OF_BROKEN: f64 = 0.3;
 /// What is left of a tolerance and what is taken of it may add up to a little more.
 const ROUNDED: f64 = 1.0 + 1e-9;
@@ -357,7 +358,7 @@ fn dn(square: f64) -> f64 {
 
 /// What sampling, silhouettes and mixed light may take of `quality.max_error_dn`: the rest is kept for sources beside their place.
 pub(super) fn for_sampling_dn(quality: &QualitySpec) -> f64 {
-    (1.0 - KEPT_FOR_DISPLACED * KEPT_FOR_DISPLACED).sqrt() * quality.max_error_dn
+    (1.0 - LEFT_FOR_DISPLACED * LEFT_FOR_DISPLACED).sqrt() * quality.max_error_dn
 }
 
 /// What sources beside their place may cost beside all others, 1/255: what these leave of the tolerance.
@@ -370,8 +371,12 @@ pub(super) fn for_displaced_dn(quality: &QualitySpec, others_dn: f64) -> f64 {
 
 /// Why the tolerance is not kept; `None` if it is.
 pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: &Predicted, is_plain: bool) -> Option<String> {
-    if quality.preset == Preset::Paper || predicted.picture_dn() <= ROUNDED * quality.max_error_dn {
+    let total_dn = predicted.picture_dn();
+    if total_dn <= ROUNDED * quality.max_error_dn {
         return None;
+    }
+    if quality.preset == Preset::Paper {
+        return Some(format!("quality.preset \"paper\": {total_dn:.2}/255 and what is not in it"));
     }
     let Predicted { resampling_dn, blur_dn, displaced_dn, silhouettes, layers, .. } = *predicted;
     let sampled_dn = resampling_dn.hypot(blur_dn);
