@@ -138,6 +138,29 @@ fn sources_beside_their_place_cost_what_is_predicted() {
     assert!(outside.len() * 10 <= if long { seen } else { 0 }, "{outside:#?}");
 }
 
+/// Whole periods of a vibration within an exposure: nodes at its ends, and a middle between them, meet it alike and see nothing of it.
+#[test]
+fn a_vibration_that_few_nodes_are_blind_to_is_foretold_and_followed() {
+    let all = cases().expect("cases");
+    let case = all.iter().find(|case| case.name == "vibration-200").expect("the case");
+    let planned = |max_error_dn: f64| {
+        let mut sequence = (*case.sequence).clone();
+        resize(&mut sequence.scenario, [160, 120]);
+        sequence.scenario.camera.shutter.exposure_ms = 10.0;
+        sequence.scenario.quality = QualitySpec { max_error_px: 10.0, max_error_dn, ..QualitySpec::default() };
+        let swing_px = sequence.path.peak_vibration_rad() * sequence.scenario.camera.focal_px[0];
+        let plan = Planner::new(Arc::new(sequence), &[Channel::Color], 16_384).expect("a planner").plan(FRAME).expect("a plan");
+        (plan, swing_px)
+    };
+    let (loose, swing_px) = planned(200.0);
+    let (nodes, missed_px) = (loose.blur.expect("an exposure").solved(), loose.predicted.nodes_px);
+    assert!(nodes == 2 && missed_px > 0.7 * swing_px, "{nodes} nodes miss {missed_px} px of {swing_px}");
+    assert!(loose.predicted.displaced_dn > 1.0, "{:?}", loose.predicted);
+    // Two periods ask for four nodes each.
+    let (tight, _) = planned(1.0);
+    assert!(tight.blur.expect("an exposure").solved() > 8 && tight.predicted.displaced_dn < 1.0, "{tight}");
+}
+
 /// Where nothing keeps a tolerance the picture that is taken is near the best there is: whatever the tolerance, and not farther off than those of wider ones.
 #[test]
 fn a_tighter_tolerance_makes_no_worse_picture() {

@@ -227,6 +227,21 @@ mod tests {
     }
 
     #[test]
+    fn what_nodes_in_step_with_a_swing_miss_is_found_at_other_instants() {
+        // Thirty periods: both ends, and the middle between them, are at rest.
+        let swing = |share: f64| DVec2::new(2.0 * share, 0.7 * (30.0 * std::f64::consts::TAU * share).sin());
+        assert!(miss_px(PathStage::Straight, 1, 0, swing) < 1e-12 && may_alias(1, 30.0) && !may_alias(120, 30.0));
+        let misses: Vec<f64> =
+            (1..=128).map(|i| miss_at_px(PathStage::Straight, 1, (0.618_033_988_749_895 * f64::from(i)).fract(), swing)).collect();
+        let (most, mean2) = (misses.iter().copied().fold(0.0, f64::max), misses.iter().map(|px| px * px).sum::<f64>() / 128.0);
+        assert!((most / 0.7 - 1.0).abs() < 0.01 && (mean2.sqrt() / (0.7 * 0.5_f64.sqrt()) - 1.0).abs() < 0.02, "{most} {mean2}");
+        // With nodes enough it is that of the polynomials, wherever one looks.
+        let fine = (0..=200).map(|i| miss_at_px(PathStage::Quartic, 60, f64::from(i) / 200.0, swing)).fold(0.0, f64::max);
+        let known = (0..60).map(|k| miss_px(PathStage::Quartic, 60, k, swing)).fold(0.0, f64::max);
+        assert!(fine > 0.5 * known && fine < 1.2 * known, "{fine:.2e} {known:.2e}");
+    }
+
+    #[test]
     fn the_largest_miss_is_found() {
         for path in PathStage::ALL {
             let swing = |share: f64| DVec2::new(10.0 * share, (2.5 * share + 0.4).sin());

@@ -93,9 +93,12 @@ impl Places {
         self.0.iter().any(|place| place.sides_px[1] > 0.0)
     }
 
-    /// The same of so many rays of their own through borders that are known exactly.
-    pub fn missed_by_rays(&self, rays: u32) -> f64 {
-        let of = |&Place { part, sides_px: [width_px, path_px] }: &Place| part * missed_by_rays(rays, path_px / width_px);
+    /// The same of so many rays of their own through borders that are known exactly, but for what `still` rays leave of borders that do not move.
+    pub fn missed_by_rays(&self, rays: u32, still: u32) -> f64 {
+        let of = |&Place { part, sides_px: [width_px, path_px] }: &Place| {
+            let path = path_px / width_px;
+            part * (missed_by_rays(rays, path) - (1.0 - path).max(0.0) * missed_by_rays(still, 0.0)).max(0.0)
+        };
         self.0.iter().map(of).sum()
     }
 
