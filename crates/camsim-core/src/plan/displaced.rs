@@ -10,7 +10,7 @@
 //! of its power: `(2 pi f e)^2 / 2` for small `e`, twice the power where nothing is as it was. Where sources are displaced and by how much are taken to have nothing to do with
 //! what is seen there; where a displacement changes within the exposure, a part of it that the mean takes back is counted, on the safe side. What displacement does at silhouettes is not in it (`contours.rs`).
 
-use std::f64::consts::{LN_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_4, LN_2, PI, TAU};
 
 use glam::{DMat2, DVec2};
 
@@ -93,7 +93,7 @@ fn bessel_j0(x: f64) -> f64 {
         return polynomial(&NEAR, (x / 3.0).powi(2));
     }
     const SIZE: [f64; 7] = [0.797_884_56, -0.000_000_77, -0.005_527_40, -0.000_095_12, 0.001_372_37, -0.000_728_05, 0.000_144_76];
-    const PHASE: [f64; 7] = [-0.785_398_16, -0.041_663_97, -0.000_039_54, 0.002_625_73, -0.000_541_25, -0.000_293_33, 0.000_135_58];
+    const PHASE: [f64; 7] = [-FRAC_PI_4, -0.041_663_97, -0.000_039_54, 0.002_625_73, -0.000_541_25, -0.000_293_33, 0.000_135_58];
     let inverse = 3.0 / x;
     polynomial(&SIZE, inverse) / x.sqrt() * (x + polynomial(&PHASE, inverse)).cos()
 }
