@@ -9,6 +9,8 @@
 //! With rays of their own pixels at silhouettes have neither; but the ideal frame's samples know to a part of its pixels where the border is. Where
 //! meshes of other colours touch, rays change nothing: only a finer ideal frame does.
 
+mod rays;
+
 use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,13 +37,6 @@ const STRIPS: f64 = 2.0;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
 const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
-/// Part of what stairs cost, squared, that rays leave of it; and how sure what is known of rays is, which was found with a look once a pixel.
-const RAYS_LEAVE: f64 = 0.42;
-const SAFETY_WITH_RAYS: f64 = 1.2;
-/// How many rays there may be, as powers of two: only then are their places even. Over an exposure twice as many at least.
-const STILL_RAYS: u32 = 16;
-const LEAST_RAYS: u32 = 4;
-const MOST_RAYS: u32 = 8;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
 const LEAST_LEFT: f64 = 0.1;
 /// Lines of three through three by three places, the border's first.
@@ -193,31 +188,6 @@ impl Outlook {
         self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
     }
 
-    /// Rays a pixel: the fewest that add no more than a part of the error, squared, that the samples leave which they go through.
-    pub fn rays(&self, scale: f64, fine: u32, most_part: f64) -> u32 {
-        let enough = |rays: &u32| self.missed_by_rays(*rays, fine) <= most_part * self.left_by_samples(scale, fine);
-        let least = LEAST_RAYS + u32::from(self.places.move_on());
-        (least..MOST_RAYS).map(|log2| 1 << log2).find(enough).unwrap_or(1 << MOST_RAYS)
-    }
-
-    /// What is known of samples was found with so many rays through borders that stood still.
-    fn missed_by_rays(&self, rays: u32, fine: u32) -> f64 {
-        self.places.missed_by_rays(rays, STILL_RAYS * fine)
-    }
-
-    fn left_by_samples(&self, scale: f64, fine: u32) -> f64 {
-        RAYS_LEAVE * self.places.along_whole_pixels(scale) / f64::from(fine * fine)
-    }
-
-    /// With so many rays of their own: a border is known to a part of a fine pixel.
-    pub fn with_rays(&self, sampling: &Sampling, blur: Option<BlurStage>, fine: u32, rays: u32) -> Contours {
-        let as_they_are = self.places.left(sampling, blur);
-        let through_samples = self.left_by_samples(sampling.scale, fine) + self.missed_by_rays(rays, fine);
-        let of_feet = if fine > 1 { through_samples } else { as_they_are };
-        let touching = self.once_a_pixel * (as_they_are * self.flush + of_feet * self.feet);
-        self.of((SAFETY_WITH_RAYS / SAFETY).powi(2) * (through_samples * self.steps_apart + touching))
-    }
-
     fn of(&self, square: f64) -> Contours {
         let Self { share, contrast_dn, hidden_share, .. } = *self;
         // Of no silhouettes at all the sum is -0.
@@ -309,7 +279,10 @@ pub(super) mod tests {
 
     use glam::{DQuat, DVec3};
 
-    use super::*;
+    use super::{
+        rays::{RAYS_LEAVE, SAFETY_WITH_RAYS},
+        *,
+    };
     use crate::{
         plan::{SurfaceReads, exposure::ExposurePath, stairs},
         pose::BodyState,

@@ -164,8 +164,10 @@ impl Rays {
     const FEWEST: Self = Self { fine: 1, most_part: FEW_ADD };
 
     /// In the order in which they are tried: more pixels cost less than finer ones, so that these are for what the finest ideal frame does not do.
-    fn all() -> impl Iterator<Item = Self> {
-        (1..=edges::MOST_FINE).flat_map(|fine| [FEW_ADD, MANY_ADD].map(|most_part| Self { fine, most_part }))
+    /// Where nothing moves the fewest add nothing.
+    fn all(moves: bool) -> impl Iterator<Item = Self> {
+        let parts: &[f64] = if moves { &[FEW_ADD, MANY_ADD] } else { &[FEW_ADD] };
+        (1..=edges::MOST_FINE).flat_map(move |fine| parts.iter().map(move |&most_part| Self { fine, most_part }))
     }
 }
 
@@ -184,7 +186,7 @@ impl WithRays<'_> {
     /// The first kind of rays with which a picture keeps the tolerance, or comes near the best there is.
     fn choose(&self) -> (Choice, Rays) {
         let mut failed = Vec::new();
-        for rays in Rays::all() {
+        for rays in Rays::all(self.outlook.moves()) {
             let choice = self.choose_of(rays);
             if choice.within {
                 return (choice, rays);
