@@ -249,8 +249,6 @@ mod tests {
             alike_ms_per_frame_p50: Some(ms),
             alike_cpu_ms_per_frame: None,
             alike_to_full_ms: Some(to_full_ms),
-            live_share: 1.0,
-            alike_live_to_full_ms: Some(to_full_ms),
         }
     }
 
@@ -311,7 +309,7 @@ mod tests {
         assert!(table.iter().all(|line| line.matches('|').count() == table[0].matches('|').count()), "{table:#?}");
         assert!(text.contains("| Blender Cycles, two cores | 8900 |"), "{text}");
         // A frame without its lens takes longer: the promise is not kept, and the table says so.
-        assert!(text.contains("| sampled alike, a live pixel takes no more time without an effect | more without lens | no |"), "{text}");
+        assert!(text.contains("| sampled alike, a frame takes no more time without an effect | more without lens | no |"), "{text}");
         assert_eq!(report.csv().lines().count(), 1 + report.rows.len());
         let svg = report.plot().expect("a plot");
         assert!(svg.contains("smooth") && svg.contains("all effects"));

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use camsim_core::{
     mount::{CameraPath, MountError},
-    photometric::vignette_weight,
     plan::{FramePlan, Planner},
     scenario::{Auto, Channel, LensSpec, QualitySpec, ShutterSpec, Silhouettes},
     sequence::Sequence,
@@ -137,10 +136,6 @@ pub struct AblationRow {
     pub alike_cpu_ms_per_frame: Option<f64>,
     /// See above.
     pub alike_to_full_ms: Option<[f64; 3]>,
-    /// Share of the pixels that any light reaches: without a vignette they may be more.
-    pub live_share: f64,
-    /// [`Self::alike_to_full_ms`] for as many live pixels as the whole camera has.
-    pub alike_live_to_full_ms: Option<[f64; 3]>,
 }
 
 /// Times of a camera without each effect, without more and more of them, without any over a picture that is kept, and of a bare copy.
@@ -176,15 +171,11 @@ pub fn measure(engine: &Engine, full: &Arc<Sequence>, effort: Effort) -> Result<
         Err(_) => vec![None; planned.len()],
     };
     let full_alike = alike.first().cloned().flatten();
-    let live: Vec<f64> = variants.iter().map(|(sequence, _)| live_share(sequence)).collect();
-    let rows = names.into_iter().zip(planned.iter().zip(&alike)).zip(&live);
-    let mut rows: Vec<_> = rows
-        .map(|((name, (own, alike)), own_live)| {
-            row(name, own, Some(&planned[0]), alike.as_ref().zip(full_alike.as_ref()), [*own_live, live[0]])
-        })
-        .collect();
+    let rows = names.into_iter().zip(planned.iter().zip(&alike));
+    let mut rows: Vec<_> =
+        rows.map(|(name, (own, alike))| row(name, own, Some(&planned[0]), alike.as_ref().zip(full_alike.as_ref()))).collect();
     let copy = blit::measure(engine.gpu(), full.scenario.camera.size_px, planned[0].wall_ms.len().max(3), effort.burst)?;
-    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None, None, [1.0; 2]));
+    rows.push(row("all: a finished picture copied on the device and to the host".to_owned(), &copy, None, None));
     Ok(rows)
 }
 
@@ -202,21 +193,9 @@ fn alike(variants: &[(Arc<Sequence>, bool)], plan: &FramePlan) -> Vec<(Arc<Seque
     variants.iter().map(held).collect()
 }
 
-/// Share of the pixels that the vignette lets any light through to; all of them have a ray of the lens here.
-fn live_share(sequence: &Sequence) -> f64 {
-    let thresholds = sequence.scenario.camera.photometric.vignette_thresholds;
-    sequence.vignette.as_ref().map_or(1.0, |map| {
-        let live = map.values.iter().filter(|value| vignette_weight(**value, thresholds) > 0.0).count();
-        live as f64 / map.values.len().max(1) as f64
-    })
-}
-
-/// `live`: shares of live pixels, this row's and the whole camera's.
-fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times, &Times)>, live: [f64; 2]) -> AblationRow {
-    let scaled = |own: &Times, full: &Times, times: f64| {
-        quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| times * own - full).collect::<Vec<_>>())
-    };
-    let difference = |own: &Times, full: &Times| scaled(own, full, 1.0);
+fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times, &Times)>) -> AblationRow {
+    let difference =
+        |own: &Times, full: &Times| quartiles(&own.wall_ms.iter().zip(&full.wall_ms).map(|(own, full)| own - full).collect::<Vec<_>>());
     AblationRow {
         without,
         ms_per_frame_p50: own.p50_p99_ms()[0],
@@ -225,8 +204,6 @@ fn row(without: String, own: &Times, full: Option<&Times>, alike: Option<(&Times
         alike_ms_per_frame_p50: alike.map(|(own, _)| own.p50_p99_ms()[0]),
         alike_cpu_ms_per_frame: alike.and_then(|(own, _)| own.processor_p50_ms()),
         alike_to_full_ms: alike.map(|(own, full)| difference(own, full)),
-        live_share: live[0],
-        alike_live_to_full_ms: alike.map(|(own, full)| scaled(own, full, live[1] / live[0].max(1e-9))),
     }
 }
 

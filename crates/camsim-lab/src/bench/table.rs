@@ -123,15 +123,15 @@ impl Report {
     fn ablation(&self, text: &mut String) -> std::fmt::Result {
         writeln!(text, "\n### What each effect costs (case all-effects)\n")?;
         let columns = "ms a frame | to the whole camera, ms (quartiles) | processor ms";
-        writeln!(text, "| without | {columns} | sampled alike, {columns} | for as many live pixels, to the whole camera, ms |")?;
-        writeln!(text, "|---|---|---|---|---|---|---|---|")?;
+        writeln!(text, "| without | {columns} | sampled alike, {columns} |")?;
+        writeln!(text, "|---|---|---|---|---|---|---|")?;
         let difference = |quartiles: Option<[f64; 3]>| {
             quartiles.map_or("-".into(), |[low, median, high]| format!("{median:+.1} ({low:+.1} .. {high:+.1})"))
         };
         for row in &self.ablation {
             writeln!(
                 text,
-                "| {} | {:.1} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {:.1} | {} | {} | {} | {} | {} |",
                 row.without,
                 row.ms_per_frame_p50,
                 difference(row.to_full_ms),
@@ -139,7 +139,6 @@ impl Report {
                 decimal(row.alike_ms_per_frame_p50),
                 difference(row.alike_to_full_ms),
                 decimal(row.alike_cpu_ms_per_frame),
-                difference(row.alike_live_to_full_ms),
             )?;
         }
         Ok(())
@@ -252,11 +251,11 @@ impl Report {
         let single = &rest[..rest.len().min(super::ablation::EFFECTS.len())];
         // The lower quartile, so that noise about zero does not count as time lost.
         let full_ms = full.alike_ms_per_frame_p50.unwrap_or_default();
-        let dearer: Vec<_> = single.iter().filter(|row| row.alike_live_to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full_ms)).collect();
+        let dearer: Vec<_> = single.iter().filter(|row| row.alike_to_full_ms.is_some_and(|[low, ..]| low > 0.02 * full_ms)).collect();
         let names = dearer.iter().map(|row| row.without.as_str()).collect::<Vec<_>>().join(", ");
         let measured = if dearer.is_empty() { "each does".to_owned() } else { format!("more without {names}") };
         promises.push(Promise {
-            what: "sampled alike, a live pixel takes no more time without an effect".into(),
+            what: "sampled alike, a frame takes no more time without an effect".into(),
             measured,
             kept: dearer.is_empty(),
         });
