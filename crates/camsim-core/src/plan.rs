@@ -91,6 +91,8 @@ pub struct Planner {
     shutter: Shutter,
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
+    /// The same with half of its probes, for even frames and odd ones of a group.
+    halves: Option<[Arc<LensReach>; 2]>,
     outline: Arc<edges::SceneOutline>,
     grain: Arc<grain::SceneGrain>,
     surfaces: Arc<surfaces::Surfaces>,
@@ -99,6 +101,7 @@ pub struct Planner {
     max_ideal_px: u64,
     /// What the probes of the last frames see around them.
     around: Kept<Vec<contours::Around>>,
+    around_by_half: Kept<Vec<contours::Around>>,
     /// The last groups of frames that were looked at.
     groups: Kept<sharing::Group>,
     /// The last plan of a frame by itself: whoever asks whether it can be planned asks for it again.
@@ -145,6 +148,7 @@ impl Planner {
             Some(_) => None,
             None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
         };
+        let halves = fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let max_ideal_px = MAX_IDEAL_PX;
         Ok(Self {
@@ -152,6 +156,7 @@ impl Planner {
             shutter,
             zoom,
             fixed,
+            halves,
             outline,
             grain,
             surfaces,
@@ -159,6 +164,7 @@ impl Planner {
             max_side_px,
             max_ideal_px,
             around: Kept::new(FRAMES_KEPT),
+            around_by_half: Kept::new(FRAMES_KEPT),
             groups: Kept::new(GROUPS_KEPT),
             last: Kept::new(1),
         })

@@ -95,6 +95,8 @@ pub struct GpuContext {
     pub queue: wgpu::Queue,
     /// Description of the adapter.
     pub adapter: AdapterSummary,
+    /// Whether the device is this machine's processor.
+    pub(crate) is_software: bool,
     /// Largest side of a picture that is held whole.
     pub(crate) max_picture_px: u32,
     /// Pixels of a line that a thread of the reverse kernel takes.
@@ -166,11 +168,9 @@ impl GpuContext {
         let (device, queue) =
             pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
-        let (pixels_a_thread, texels) = match info.device_type {
-            wgpu::DeviceType::Cpu => (SOFTWARE_PIXELS, TexelForm::Light),
-            _ => (1, TexelForm::Stored),
-        };
-        Ok(Self { device, queue, adapter: summary, max_picture_px, pixels_a_thread, texels })
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
+        let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels })
     }
 
     /// Largest side of a texture.

@@ -33,6 +33,7 @@ mod ahead;
 mod error;
 mod finished;
 mod inspect;
+mod planners;
 mod readback;
 mod renew;
 mod slot;
@@ -242,7 +243,7 @@ impl Session<'_> {
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
         let preparer = Preparer::new(self.planner.clone(), self.buffers.tiles().map(|tiles| tiles.ground.clone()));
-        rayon::in_place_scope(|scope| {
+        planners::scope(&self.engine.gpu, |scope| {
             let mut ahead = Ahead::start(scope, &preparer, frames.into_iter());
             let mut in_flight: Option<InFlight> = None;
             let mut slot = 0;

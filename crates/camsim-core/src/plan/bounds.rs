@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::{
     KeyFrame, TemporalStage,
-    probes::{Probe, probes},
+    probes::{Probe, probes, spacing_px},
     surfaces::Surfaces,
 };
 use crate::{
@@ -36,6 +36,8 @@ pub struct LensReach {
     pub least_stretch: f64,
     /// Pixels at which errors are predicted.
     pub(super) probes: Vec<Probe>,
+    /// Side of the part of the image that each of them stands for, pixels.
+    pub(super) probe_px: f64,
 }
 
 impl LensReach {
@@ -60,7 +62,21 @@ impl LensReach {
         stretches.sort_by(f64::total_cmp);
         let least_stretch = stretches.get(stretches.len() / 10).copied().unwrap_or(1.0);
         let probes = probes(&camera);
-        (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes })
+        let probe_px = spacing_px(&camera);
+        (!rays.is_empty()).then_some(Self { camera, rays, least_stretch, probes, probe_px })
+    }
+
+    /// The same with every second of its probes: two neighbours in time, one `odd` and one not, have all of them.
+    pub(super) fn with_half_the_probes(&self, odd: bool) -> Self {
+        let Self { camera, rays, least_stretch, .. } = self;
+        let probes = self.probes.iter().filter(|probe| probe.is_odd == odd).copied().collect();
+        Self {
+            camera: camera.clone(),
+            rays: rays.clone(),
+            least_stretch: *least_stretch,
+            probes,
+            probe_px: std::f64::consts::SQRT_2 * self.probe_px,
+        }
     }
 
     /// Ideal pixels for each of the camera's, at least: a lens that magnifies somewhere needs a finer ideal frame there; beyond 2 the memory

@@ -18,7 +18,7 @@ use super::{
     dry_run::{MAX_LOOK_UPS, Trial, Truth},
     holes,
     levels::Expected,
-    probes::{Probe, spacing_px},
+    probes::Probe,
     surfaces::Surfaces,
 };
 use crate::{
@@ -347,7 +347,7 @@ impl<'a> Truths<'a> {
 
     /// Side of the part of the picture that a probe stands for, ideal pixels.
     fn probe_px(&self) -> f64 {
-        self.trial.ideal.focal_px.x / self.reach.camera.focal_px.x * spacing_px(&self.reach.camera)
+        self.trial.ideal.focal_px.x / self.reach.camera.focal_px.x * self.reach.probe_px
     }
 
     /// Mean squared error over the picture by skylines that are elsewhere in an ideal frame, of the linear range; `gain` is that of a pixel.

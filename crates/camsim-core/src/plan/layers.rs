@@ -8,12 +8,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{
-    KeyFrame, LensReach,
-    keys::nearest_first,
-    probes::{Probe, spacing_px},
-    surfaces::Surfaces,
-};
+use super::{KeyFrame, LensReach, keys::nearest_first, probes::Probe, surfaces::Surfaces};
 use crate::{mount::CameraPath, shutter::Shutter};
 
 /// Times what is expected: of a few thousand rays few may pass near a pane's border.
@@ -73,7 +68,7 @@ impl Search<'_> {
     fn square(&self, i: usize, probe: &Probe, place: DVec2) -> Option<f64> {
         let phase = PHASES[i % PHASES.len()];
         let size_px = self.reach.camera.size_px;
-        let offset_px = (spacing_px(&self.reach.camera) * place).round();
+        let offset_px = (self.reach.probe_px * place).round();
         let [x, y] = [(0, offset_px.x), (1, offset_px.y)]
             .map(|(axis, offset): (usize, f64)| (f64::from(probe.pixel[axis]) + offset).clamp(0.0, f64::from(size_px[axis] - 1)) as u32);
         let moved_px = DVec2::new(f64::from(x), f64::from(y)) - DVec2::from_array(probe.pixel.map(f64::from));

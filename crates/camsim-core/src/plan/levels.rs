@@ -38,7 +38,7 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
-const SAMPLES_PER_PX: [f64; 11] = [0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
+const SAMPLES_PER_PX: [f64; 14] = [0.25, 0.33, 0.4, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
 /// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may take 0.995 of it; and of an error that is above it anyway the part
 /// that these may be.
 const LEFT_FOR_DISPLACED: f64 = 0.1;

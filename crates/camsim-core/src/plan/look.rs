@@ -53,7 +53,8 @@ impl Planner {
     pub(super) fn look<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>) -> Result<Look<'a>, PlanError> {
         let stamp_s = self.stamp_s(frame);
         let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
-        let reach = match (&self.fixed, &self.zoom, zoom) {
+        let of_group = common.and_then(|_| self.half_the_probes(frame));
+        let reach = match (&of_group.or_else(|| self.fixed.clone()), &self.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
             (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
             _ => return Err(PlanError::NoRay),
@@ -166,8 +167,8 @@ impl<'a> Look<'a> {
         };
         let truths = error::Truths::of_silhouettes(reach, trial);
         let gain = &prospect::gain(sequence, &reach.camera);
-        let around =
-            self.planner.around.of(self.frame, || contours::Search { reach, surfaces, path, shutter, stamp_s, gain }.look_around());
+        let known = if self.common.is_some() { &self.planner.around_by_half } else { &self.planner.around };
+        let around = known.of(self.frame, || contours::Search { reach, surfaces, path, shutter, stamp_s, gain }.look_around());
         let least_share = truths.share_apart(|probe| around[probe].is_beside);
         let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
         Some(contours::Outlook::new(&around, &reach.camera, key_pose, holes, sky_strips, least_share))

@@ -20,6 +20,8 @@ pub(super) struct Probe {
     pub distorted: DVec2,
     /// d(uv)/d(output pixel), one column an axis.
     pub uv_from_px: DMat2,
+    /// Of two kinds of them, which lie like the fields of a chessboard, the second.
+    pub is_odd: bool,
 }
 
 /// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only pixels that have a ray.
@@ -31,11 +33,11 @@ pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
             let k = f64::from(j * columns + i) + 0.5;
             let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])]
                 .map(|(cell, cells, side, spread)| ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32);
-            [x.min(width - 1), y.min(height - 1)]
+            ([x.min(width - 1), y.min(height - 1)], (i + j) % 2 == 1)
         })
     });
-    let corners = [[0, 0], [width - 1, 0], [0, height - 1], [width - 1, height - 1]];
-    inside.chain(corners).filter_map(|pixel| probe(camera, pixel)).collect()
+    let corners = [([0, 0], false), ([width - 1, 0], true), ([0, height - 1], true), ([width - 1, height - 1], false)];
+    inside.chain(corners).filter_map(|(pixel, is_odd)| probe(camera, pixel, is_odd)).collect()
 }
 
 /// Columns and rows of probes: no more than there are pixels.
@@ -49,19 +51,21 @@ pub(super) fn spacing_px(camera: &CameraModel) -> f64 {
     (width * height).sqrt()
 }
 
-fn probe(camera: &CameraModel, pixel: [u32; 2]) -> Option<Probe> {
+fn probe(camera: &CameraModel, pixel: [u32; 2], is_odd: bool) -> Option<Probe> {
     let distorted = camera.distorted_from_pixel(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])));
     let uv = camera.lens.undistort(distorted)?;
     let uv_from_px = camera.lens.jacobian(uv).inverse() * DMat2::from_diagonal(camera.focal_px.recip());
-    uv_from_px.is_finite().then_some(Probe { pixel, uv, distorted, uv_from_px })
+    uv_from_px.is_finite().then_some(Probe { pixel, uv, distorted, uv_from_px, is_odd })
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
 
+    use std::{collections::HashSet, sync::Arc};
+
     use super::*;
-    use crate::scenario::LensModel;
+    use crate::{plan::LensReach, scenario::LensModel};
 
     #[test]
     fn probes_cover_the_image_and_know_how_the_ray_changes() {
@@ -79,6 +83,23 @@ mod tests {
                 let Some(beside) = camera.unproject(at + 1e-4 * axis) else { continue };
                 let numeric = (beside - probe.uv) / 1e-4;
                 assert!(numeric.distance(probe.uv_from_px * axis) < 1e-3 * numeric.length(), "{probe:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_frames_of_a_group_have_all_probes_and_each_has_them_everywhere() {
+        let camera = CameraModel::new([640, 480], [307.6, 300.0], None, LensModel::Pinhole, &[]).unwrap();
+        let reach = LensReach::new(Arc::new(camera)).unwrap();
+        let halves = [false, true].map(|odd| reach.with_half_the_probes(odd));
+        let pixels = |reach: &LensReach| reach.probes.iter().map(|probe| probe.pixel).collect::<HashSet<_>>();
+        let [even, odd] = halves.each_ref().map(pixels);
+        assert!(even.is_disjoint(&odd) && even.union(&odd).count() == reach.probes.len() && even.len() == odd.len());
+        for half in &halves {
+            assert!((half.probe_px.powi(2) / reach.probe_px.powi(2) - 2.0).abs() < 1e-9);
+            for quarter in 0..4 {
+                let of_quarter = half.probes.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
+                assert!((53..57).contains(&of_quarter.count()));
             }
         }
     }

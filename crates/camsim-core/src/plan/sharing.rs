@@ -6,7 +6,10 @@
 //! with the same dry runs and the same tolerances. If all of them keep what a frame of their own would, for less time, the group shares; otherwise, or where halves could save more, each of its halves
 //! is tried, and so on. Where silhouettes have rays of their own nothing is shared: another instant sees more of what is behind them.
 
-use std::{ops::Range, sync::OnceLock};
+use std::{
+    ops::Range,
+    sync::{Arc, OnceLock},
+};
 
 use rayon::prelude::*;
 
@@ -141,8 +144,14 @@ impl Planner {
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
     pub fn forget(&self) {
         self.around.forget();
+        self.around_by_half.forget();
         self.groups.forget();
         self.last.forget();
+    }
+
+    /// What frames of a group look at: neighbours in time are nearly alike, and have other probes each.
+    pub(super) fn half_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
+        self.halves.as_ref().map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -234,6 +243,8 @@ impl Planner {
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
             let sampling = candidates.sampling(coarsest, share_of_dn)?;
+            // The outermost have the most silhouettes elsewhere.
+            candidates.see(frames.end - 1, Some(sampling))?;
             let first = candidates.plan(frames.start, sampling);
             let first = first.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
             let by_pictures = candidates.too_coarse(sampling, own).ok()?;

@@ -5,10 +5,7 @@ use rayon::prelude::*;
 
 use super::{SAFETY, Trial, Truths, Way};
 use crate::{
-    plan::{
-        FramePlan, PlanError, Planner, TemporalStage,
-        probes::{grid, spacing_px},
-    },
+    plan::{FramePlan, PlanError, Planner, TemporalStage, probes::grid},
     scenario::Preset,
     temporal::IdealGeometry,
 };
@@ -78,7 +75,8 @@ impl Planner {
     /// # Errors
     /// As [`Planner::plan`].
     pub fn error_map(&self, plan: &FramePlan) -> Result<ErrorMap, PlanError> {
-        let reach = self.look(plan.frame, None)?.reach;
+        let own = self.look(plan.frame, None)?.reach;
+        let reach = if plan.shared_by.is_some() { self.half_the_probes(plan.frame).unwrap_or(own) } else { own };
         let ideal = self.tried(plan)?;
         // Of several ideal frames the prediction has the one in the middle of the window.
         let (key_s, key_pose) = match plan.keys.as_slice() {
@@ -115,7 +113,7 @@ impl Planner {
                 place.error = error;
             }
         }
-        Ok(ErrorMap { places, everywhere_px, grid: grid(&reach.camera), reach_px: spacing_px(&reach.camera) })
+        Ok(ErrorMap { places, everywhere_px, grid: grid(&reach.camera), reach_px: reach.probe_px })
     }
 
     /// The ideal frame that a plan's prediction was made for: its own, but where what was chosen then asked for a larger one.
