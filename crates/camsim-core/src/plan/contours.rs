@@ -69,7 +69,7 @@ pub(super) struct Search<'a> {
 }
 
 /// What is seen around a probe, wherever the ideal frame is taken.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Around {
     contour: Option<Contour>,
     /// Side of the pixel and how far the path over the exposure goes, pixels of the camera's focal length; where there is a border.
@@ -103,7 +103,7 @@ pub(super) struct Outlook {
 }
 
 /// One probe near a silhouette.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Contour {
     contrast2: f64,
     path_px: f64,
@@ -115,6 +115,15 @@ struct Contour {
 }
 
 impl Around {
+    /// The same as a camera elsewhere would see it.
+    pub fn seen_from(&self, pose: CameraPose) -> Self {
+        let mut there = self.clone();
+        if let Some(contour) = &mut there.contour {
+            contour.pose = pose;
+        }
+        there
+    }
+
     /// How much there is of borders, and the side of the pixel and its path.
     fn place(&self) -> Option<(f64, [f64; 2])> {
         let Crossed { steps, flush, feet, .. } = self.crossed;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::{
     BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours,
-    displaced::ShownWaves, dry_run, edges, error, exposure, forced, layers, levels::Sampling, motion, paper, prospect, sharing, zoom_at,
+    displaced::ShownWaves, dry_run, edges, error, exposure, forced, layers, levels::Sampling, motion, paper, probes::Probe, prospect,
+    sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -125,7 +126,7 @@ impl<'a> Look<'a> {
     }
 
     pub fn scenery(&self) -> Scenery<'a> {
-        let Planner { sequence, shutter, surfaces, grain, outline, .. } = self.planner;
+        let Planner { sequence, shutter, surfaces, grain, outline, fixed, .. } = self.planner;
         let Self { reach, stamp_s, key_pose, .. } = self;
         let ideal = match self.is_paper() {
             true => paper::ideal_geometry(&reach.camera),
@@ -134,7 +135,8 @@ impl<'a> Look<'a> {
         let motion = self.motion_in(&ideal);
         let reason_for_none = outline.reason_for_none(&sequence.scene, key_pose, ideal.tangents(), motion.travel_m);
         Scenery {
-            prospect: prospect::Prospect::new(reach, sequence, surfaces, grain, shutter, *stamp_s, key_pose),
+            // A few of all probes, whoever has the others.
+            prospect: prospect::Prospect::new(fixed.as_ref().unwrap_or(reach), sequence, surfaces, grain, shutter, *stamp_s, key_pose),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
             layers: self.layers(&[self.key()]),
             ideal,
@@ -167,11 +169,33 @@ impl<'a> Look<'a> {
         };
         let truths = error::Truths::of_silhouettes(reach, trial);
         let gain = &prospect::gain(sequence, &reach.camera);
-        let known = if self.common.is_some() { &self.planner.around_by_half } else { &self.planner.around };
-        let around = known.of(self.frame, || contours::Search { reach, surfaces, path, shutter, stamp_s, gain }.look_around());
+        let around = self.around(self.frame, reach);
         let least_share = truths.share_apart(|probe| around[probe].is_beside);
         let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
-        Some(contours::Outlook::new(&around, &reach.camera, key_pose, holes, sky_strips, least_share))
+        let outlook = |around: &[contours::Around]| contours::Outlook::new(around, &reach.camera, key_pose, holes, sky_strips, least_share);
+        Some(match self.common.and_then(|_| self.around_other_half()) {
+            Some(others) => outlook(&[&around[..], &others].concat()),
+            None => outlook(&around),
+        })
+    }
+
+    /// What the probes of a frame see around them.
+    fn around(&self, frame: u64, reach: &LensReach) -> Arc<Vec<contours::Around>> {
+        let Planner { sequence, shutter, surfaces, around, around_by_half, .. } = self.planner;
+        let gain = &prospect::gain(sequence, &reach.camera);
+        let search = contours::Search { reach, surfaces, path: self.path(), shutter, stamp_s: self.planner.stamp_s(frame), gain };
+        let known = if self.common.is_some() { around_by_half } else { around };
+        known.of(frame, || search.look_around())
+    }
+
+    /// What is around the probes that this frame of a group leaves to the one beside it, as its own camera would see that: borders are few, and half of them tell
+    /// too little.
+    fn around_other_half(&self) -> Option<Vec<contours::Around>> {
+        let other = self.frame ^ 1;
+        let reach = self.planner.half_the_probes(other).filter(|_| other < self.planner.sequence.frames)?;
+        let own_pose = |probe: &Probe| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]));
+        let found = self.around(other, &reach);
+        Some(found.iter().zip(&reach.probes).map(|(around, probe)| around.seen_from(own_pose(probe))).collect())
     }
 }
 

@@ -15,8 +15,8 @@ use super::{
 };
 use crate::{camera::CameraModel, mount::CameraPath, photometric::vignette_weight, pose::CameraPose, sequence::Sequence, shutter::Shutter};
 
-/// So many probes are looked at, evenly far apart, and so many of these are taken at most.
-const LOOKED_AT: usize = 87;
+/// One probe in so many is looked at, not in step with the grid of 24 columns, and so many of these are taken at most.
+const PROBE_STEP: usize = 5;
 const SIGHTS: usize = 32;
 
 /// One place of the image: what it shows, in pixels of the camera (its focal length, before the lens) at mid-exposure.
@@ -93,7 +93,7 @@ impl<'a> Prospect<'a> {
                 parts: Parts::default(),
             })
         };
-        let seen: Vec<Seen<'_>> = probes.par_iter().step_by((probes.len() / LOOKED_AT).max(1)).map(sight).collect();
+        let seen: Vec<Seen<'_>> = probes.par_iter().step_by(PROBE_STEP).map(sight).collect();
         let counted = seen.iter().filter(|seen| !matches!(seen, Seen::Several)).count();
         let sights = seen.into_iter().filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None }).collect();
         let width = |probe: &Probe| {

@@ -33,12 +33,12 @@ pub struct ErrorPlace {
 /// The predicted error of a frame from place to place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
-    /// One a probe: some 430, evenly over the pixels that have a ray.
+    /// One a probe: some 430, or half of them for a frame of a group, evenly over the pixels that have a ray.
     pub places: Vec<ErrorPlace>,
     /// What is known of the frame as a whole only, and comes on top everywhere while the exposure lasts: curves between its nodes, and depth between its ends.
     /// Nothing at mid-exposure.
     pub everywhere_px: f64,
-    /// Columns and rows of the grid of places over the image: one in each of its cells, and the image's corners.
+    /// Columns and rows of the grid of places over the image: one in each of its cells, or in each black or white one of a chessboard, and the image's corners.
     pub grid: [u32; 2],
     /// Half of the side of the square around a pixel whose places stand for it: that of the part of the image that each stands for.
     pub reach_px: f64,
