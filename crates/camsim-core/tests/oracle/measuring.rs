@@ -83,6 +83,8 @@ fn slopes_and_creases_are_no_silhouettes_measured_or_predicted() {
     let mut scenario = camera();
     scenario.camera.size_px = [80, 60];
     scenario.camera.shutter = rolling(0.0);
+    // With all of the probes.
+    scenario.quality.frames_per_ideal = 1;
     let own = sequence(scenario.clone(), Steady::moving(120.0), zigzag());
     let near = silhouettes(&Oracle::new(own.clone()).unwrap(), 0, &[0.0]);
     assert!(!near.contains(&true), "{} of 4800", near.iter().filter(|near| **near).count());
