@@ -243,8 +243,11 @@ impl Session<'_> {
         sink: &mut dyn FnMut(Finished) -> Result<(), E>,
     ) -> Result<(), RenderError<E>> {
         let preparer = Preparer::new(self.planner.clone(), self.buffers.tiles().map(|tiles| tiles.ground.clone()));
-        planners::scope(&self.engine.gpu, |scope| {
-            let mut ahead = Ahead::start(scope, &preparer, frames.into_iter());
+        let mut frames = frames.into_iter();
+        let first: Vec<u64> = frames.by_ref().take(2).collect();
+        let is_single = first.len() < 2;
+        planners::scope(&self.engine.gpu, is_single, |scope| {
+            let mut ahead = Ahead::start(scope, &preparer, first.into_iter().chain(frames));
             let mut in_flight: Option<InFlight> = None;
             let mut slot = 0;
             loop {

@@ -11,9 +11,10 @@ use crate::context::GpuContext;
 const NICE: i32 = 5;
 
 /// Runs `work` with a scope whose tasks plan. Where the device is the same processor, they are threads of their own that stand back: every frame waits for the device's
-/// passes, but plans are made ahead, and while a pass has one thread there is room for them. Whoever calls from a pool of rayon's has the work done there.
-pub(super) fn scope<'scope, R>(gpu: &GpuContext, work: impl FnOnce(&Scope<'scope>) -> R) -> R {
-    let stands_back = gpu.is_software && rayon::current_thread_index().is_none();
+/// passes, but plans are made ahead, and while a pass has one thread there is room for them. A single frame, as the viewer asks for, waits for its plan: that goes first.
+/// Whoever calls from a pool of rayon's has the work done there.
+pub(super) fn scope<'scope, R>(gpu: &GpuContext, is_single: bool, work: impl FnOnce(&Scope<'scope>) -> R) -> R {
+    let stands_back = gpu.is_software && !is_single && rayon::current_thread_index().is_none();
     match stands_back.then(of_low_priority).flatten() {
         Some(pool) => pool.in_place_scope(work),
         None => rayon::in_place_scope(work),
@@ -31,4 +32,33 @@ fn of_low_priority() -> Option<&'static ThreadPool> {
 fn stand_back() {
     #[cfg(target_os = "linux")]
     let _ = rustix::process::nice(NICE);
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::sync::mpsc::channel;
+
+    use super::*;
+    use crate::context::AdapterChoice;
+
+    /// Priority of the thread that a task of the scope runs on, above that of this one.
+    fn above(gpu: &GpuContext, is_single: bool) -> i32 {
+        let (give, given) = channel();
+        scope(gpu, is_single, |scope| scope.spawn(move |_| give.send(rustix::process::nice(0).unwrap()).unwrap()));
+        given.recv().unwrap() - rustix::process::nice(0).unwrap()
+    }
+
+    #[test]
+    #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+    fn plans_of_several_frames_stand_back_on_software_adapters_alone() {
+        let gpu = GpuContext::new(AdapterChoice::Software).unwrap();
+        // Threads take over the priority of the one that starts them, which may have little left to give up.
+        let most = (19 - rustix::process::nice(0).unwrap()).min(NICE);
+        let several = if gpu.is_software { most } else { 0 };
+        assert_eq!([above(&gpu, false), above(&gpu, true), above(&gpu, false)], [several, 0, several]);
+        let own = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        assert_eq!(own.install(|| above(&gpu, false)), 0);
+    }
 }
