@@ -202,8 +202,9 @@ impl<'a> Look<'a> {
 impl Look<'_> {
     /// What mixed light costs with these ideal frames.
     pub fn layers(&self, keys: &[KeyFrame]) -> Option<layers::Layers> {
-        let Planner { sequence, shutter, surfaces, .. } = self.planner;
-        let &Self { stamp_s, ref reach, .. } = self;
+        let Planner { sequence, shutter, surfaces, fixed, .. } = self.planner;
+        // All probes: what is mixed may be little of the picture.
+        let (stamp_s, reach) = (self.stamp_s, fixed.as_ref().unwrap_or(&self.reach));
         let gain = &prospect::gain(sequence, &reach.camera);
         let search = layers::Search { reach, surfaces, path: self.path(), shutter, stamp_s, keys, gain };
         // The paper's errors are not judged.
