@@ -150,7 +150,7 @@ const EFFECTS: [(&str, Without); 7] = [
     ("- all of these: a perfect camera", Without::Anything),
 ];
 
-/// Where the device's time goes, by its own clock.
+/// Where the time goes: the device's by its own clock.
 fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     let whole = changed(&[])?;
     let kinds = [
@@ -171,7 +171,8 @@ fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
             let times = &finished.times;
             let host = [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: read", times.read_ms)];
             let device = times.passes.iter().map(|pass| (format!("device: {}", pass.name), pass.ms));
-            for (name, ms) in host.map(|(name, ms)| (name.to_owned(), ms)).into_iter().chain(device) {
+            let reverse = times.reverse_ms.map(|ms| ("host: reverse", ms));
+            for (name, ms) in host.into_iter().chain(reverse).map(|(name, ms)| (name.to_owned(), ms)).chain(device) {
                 match column.iter_mut().find(|(known, _)| *known == name) {
                     Some((_, all)) => all.push(ms),
                     None => column.push((name, vec![ms])),

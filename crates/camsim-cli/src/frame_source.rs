@@ -54,7 +54,7 @@ impl<'a> Device<'a> {
 
 impl FrameSource for Device<'_> {
     fn adapter(&self) -> String {
-        self.engine.gpu().adapter.to_string()
+        self.engine.gpu().describe()
     }
 
     fn planner(&self) -> &Planner {

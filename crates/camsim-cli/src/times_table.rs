@@ -44,6 +44,9 @@ impl TimesTable {
         ] {
             self.part(name.to_owned(), ms);
         }
+        if let Some(ms) = times.reverse_ms {
+            self.part("host: reverse".to_owned(), ms);
+        }
         for pass in &times.passes {
             self.part(format!("device: {}", pass.name), pass.ms);
         }

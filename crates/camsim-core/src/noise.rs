@@ -13,6 +13,7 @@ pub const NOISE_STREAM: u32 = 1;
 ///
 /// The low 8 bits are patterned; use bits 8 and up.
 #[must_use]
+#[inline(always)]
 pub fn pcg4d(key: [u32; 4]) -> [u32; 4] {
     let [mut x, mut y, mut z, mut w] = key.map(|k| k.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
     let mut mix = |fold: bool| {

@@ -17,7 +17,7 @@ pub mod paper;
 pub mod path;
 
 pub(crate) use footprint::TENT_PX2;
-pub use footprint::{Footprint, TapStage};
+pub use footprint::{Footprint, TapStage, tap_shares};
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,8 @@ use std::fmt;
 
 use camsim_core::scene::TexelForm;
 
+use crate::reverse::host;
+
 /// Errors of the GPU side. Texts name the fix.
 #[derive(Debug, thiserror::Error)]
 pub enum GpuError {
@@ -19,6 +21,16 @@ pub enum GpuError {
         adapter: String,
         /// What wgpu says.
         reason: String,
+    },
+    /// An environment variable has a value that means nothing.
+    #[error("{name}={value}: set it to {allowed}, or not at all")]
+    Setting {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        allowed: &'static str,
     },
     /// The device stopped working.
     #[error("the graphics device was lost or failed: {0}; run again, with fewer or smaller frames if memory ran out")]
@@ -103,6 +115,8 @@ pub struct GpuContext {
     pub(crate) pixels_a_thread: u32,
     /// How pictures are held.
     pub(crate) texels: TexelForm,
+    /// Whether the reverse pipeline of frames that it serves runs on the host ([`crate::reverse::host`]).
+    pub(crate) reverses_on_host: bool,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -142,11 +156,24 @@ fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
     found
 }
 
+/// Where the reverse pipeline runs: as `CAMSIM_REVERSE` says, or else on the host if the device is the host's processor, that has the vectors for it, and no other shaders are to be
+/// tried.
+fn reverses_on_host(is_software: bool) -> Result<bool, GpuError> {
+    match std::env::var_os("CAMSIM_REVERSE") {
+        None => Ok(is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
+        Some(place) if place == "device" => Ok(false),
+        Some(place) if place == "host" => Ok(true),
+        Some(place) => {
+            Err(GpuError::Setting { name: "CAMSIM_REVERSE", value: place.to_string_lossy().into(), allowed: "`device` or `host`" })
+        }
+    }
+}
+
 impl GpuContext {
     /// Opens the chosen adapter.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses.
+    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses, [`GpuError::Setting`] if `CAMSIM_REVERSE` says neither place.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut candidates = ranked(choice);
         if candidates.is_empty() {
@@ -170,7 +197,21 @@ impl GpuContext {
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels })
+        let reverses_on_host = reverses_on_host(is_software)?;
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverses_on_host })
+    }
+
+    /// What renders, for people: the adapter, and that the host has a part in it where it has.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let host = if self.reverses_on_host { ", reverse pipeline on the host" } else { "" };
+        format!("{}{host}", self.adapter)
+    }
+
+    /// Whether the host makes output frames from ideal frames where it can.
+    #[must_use]
+    pub fn reverses_on_host(&self) -> bool {
+        self.reverses_on_host
     }
 
     /// Largest side of a texture.

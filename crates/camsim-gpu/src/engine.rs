@@ -12,7 +12,7 @@ use crate::{
     layout::Truth,
     recorder::{PassClock, Recorder},
     reverse::{
-        EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms,
+        EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms, host,
         lens_inverse::{LensInversePass, LensMap},
     },
     shaders::ComposeError,
@@ -33,16 +33,18 @@ mod ahead;
 mod error;
 mod finished;
 mod inspect;
+mod on_host;
 mod planners;
 mod readback;
 mod renew;
 mod slot;
 
-use ahead::{Ahead, Prepared, Preparer};
+use ahead::{Ahead, Lines, Prepared, Preparer};
 pub use error::RenderError;
 pub(crate) use error::RenderErrorBase;
 pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
+use on_host::{HostFrame, OnHost};
 use readback::{Output, coords, look_for_unknown, read_mapped};
 use renew::{noise_table, vignette};
 use slot::{Slot, Target, list_buffer, pose_buffer};
@@ -103,6 +105,12 @@ impl Engine {
         self.gpu.pixels_a_thread = pixels.clamp(1, 4096);
     }
 
+    /// Whether the host makes output frames from ideal frames, where it can ([`crate::reverse::host`]), for sessions to come: the default on a software adapter.
+    /// Pictures differ by rounding.
+    pub fn set_reverse_on_host(&mut self, on_host: bool) {
+        self.gpu.reverses_on_host = on_host;
+    }
+
     /// Most pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
@@ -135,6 +143,7 @@ impl Engine {
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             drawn: None,
+            on_host: gpu.reverses_on_host.then(|| OnHost::new(gpu, &sequence)),
             slots,
             lists: None,
             buffers,
@@ -169,6 +178,8 @@ struct Drawn {
     lod: LodSelection,
     /// Of what is mixed.
     out_of_order: u32,
+    /// Its copy in the host's memory.
+    copy: Option<usize>,
 }
 
 /// One sequence on the device.
@@ -186,6 +197,8 @@ pub struct Session<'a> {
     zoom_maps: HashMap<usize, LensMap>,
     targets: Vec<Target>,
     drawn: Option<Drawn>,
+    /// Frames that the host makes, if it makes any.
+    on_host: Option<OnHost>,
     slots: Vec<Slot>,
     /// Pixels of the frame at work that may see silhouettes, for frames that have any.
     lists: Option<[wgpu::Buffer; 2]>,
@@ -201,6 +214,8 @@ struct InFlight {
     submission: wgpu::SubmissionIndex,
     lod: LodSelection,
     out_of_order: u32,
+    /// What the host makes it from, if it does.
+    on_host: Option<(HostFrame, Lines)>,
     times: FrameTimes,
 }
 
@@ -282,39 +297,60 @@ impl Session<'_> {
         let begun = Instant::now();
         let mut clock = self.slots[slot].clock.take();
         let mut staging = self.slots[slot].staging.take().unwrap_or_else(|| Staging::new(&gpu.device));
-        let commands = self.record(&prepared, slot, Recorder::new(&gpu.device, clock.as_mut(), &mut staging));
+        let recorded = self.record(&prepared, slot, Recorder::new(&gpu.device, clock.as_mut(), &mut staging));
         self.slots[slot].clock = clock;
         self.slots[slot].staging = Some(staging);
-        let commands = commands.inspect_err(|_| {
+        let (commands, on_host) = recorded.inspect_err(|_| {
             // What was recorded to be kept will never be there.
             (self.drawn, self.lens_map) = (None, None);
             self.zoom_maps.clear();
             self.targets.clear();
+            self.on_host.iter_mut().for_each(OnHost::forget);
         })?;
         let record_ms = ms_since(begun);
         let begun = Instant::now();
         let submission = gpu.queue.submit([commands]);
         let submit_ms = ms_since(begun);
-        self.slots[slot].recall();
+        self.slots[slot].recall(on_host.is_none(), reverses_on_device(&prepared.plan, on_host.as_ref()));
+        self.on_host.iter_mut().for_each(OnHost::recall);
         self.engine.check()?;
         let (lod, out_of_order) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
         let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, submit_ms, ..FrameTimes::default() };
-        Ok(InFlight { slot, plan: prepared.plan, submission, lod, out_of_order, times })
+        let on_host = on_host.map(|frame| (frame, prepared.lines));
+        Ok(InFlight { slot, plan: prepared.plan, submission, lod, out_of_order, on_host, times })
     }
 
-    /// Every pass of a frame, in order.
-    fn record(&mut self, prepared: &Prepared, slot: usize, mut recorder: Recorder<'_>) -> Result<wgpu::CommandBuffer, RenderErrorBase> {
+    /// Every pass of a frame, in order; and what the host makes it from, if it does.
+    fn record(
+        &mut self,
+        prepared: &Prepared,
+        slot: usize,
+        mut recorder: Recorder<'_>,
+    ) -> Result<(wgpu::CommandBuffer, Option<HostFrame>), RenderErrorBase> {
         if prepared.plan.ray == RayStage::LensMap {
             self.lens_inverse(&mut recorder, &prepared.plan);
         }
         self.ideal(&mut recorder, prepared, slot)?;
-        self.reverse(&mut recorder, prepared, slot)?;
-        let slot = &self.slots[slot];
-        slot.color.copy(recorder.encoder());
-        if let Some(truth) = &slot.truth {
-            truth.copy(recorder.encoder());
+        let on_host = self.bring_to_host(&mut recorder, &prepared.plan);
+        if reverses_on_device(&prepared.plan, on_host.as_ref()) {
+            self.reverse(&mut recorder, prepared, slot)?;
+            let slot = &self.slots[slot];
+            for output in on_host.is_none().then_some(&slot.color).into_iter().chain(&slot.truth) {
+                output.copy(recorder.encoder());
+            }
         }
-        Ok(recorder.finish()?)
+        Ok((recorder.finish()?, on_host))
+    }
+
+    /// What the host makes the output frame from, where it makes frames like this.
+    fn bring_to_host(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan) -> Option<HostFrame> {
+        let on_host = self.on_host.as_mut().filter(|_| host::serves(plan))?;
+        let drawn = self.drawn.as_mut()?;
+        let gpu = &self.engine.gpu;
+        on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));
+        let target = &self.targets[drawn.target].ideal;
+        let copy = *drawn.copy.get_or_insert_with(|| on_host.copy_ideal(gpu, recorder, target, &plan.ideal));
+        Some(OnHost::frame(copy, frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase)))
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
@@ -407,6 +443,7 @@ impl Session<'_> {
             slot,
             lod,
             out_of_order,
+            copy: None,
         });
         Ok(())
     }
@@ -451,7 +488,7 @@ impl Session<'_> {
     }
 
     /// Waits for a frame and takes its pictures.
-    fn finish(&self, done: InFlight) -> Result<Finished, GpuError> {
+    fn finish(&mut self, done: InFlight) -> Result<Finished, GpuError> {
         let gpu = &self.engine.gpu;
         let wait = wgpu::PollType::Wait { submission_index: Some(done.submission), timeout: None };
         let mut times = done.times;
@@ -459,11 +496,21 @@ impl Session<'_> {
         gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
         self.engine.check()?;
         times.wait_ms = ms_since(begun);
+        let plan = done.plan;
+        let begun = Instant::now();
+        let by_host = match (&mut self.on_host, &done.on_host) {
+            (Some(on_host), Some((frame, Lines::Poses(poses)))) => Some(on_host.render(&plan, frame, &poses.entries)?),
+            _ => None,
+        };
+        times.reverse_ms = by_host.as_ref().map(|_| ms_since(begun));
         let begun = Instant::now();
         let slot = &self.slots[done.slot];
-        let color_rgba = slot.color.read()?;
-        let mut truth = slot.truth.as_ref().map(Output::read::<Truth>).transpose()?;
-        let plan = done.plan;
+        let from_device = || slot.truth.as_ref().map(Output::read::<Truth>).transpose();
+        let (color_rgba, mut truth) = match by_host {
+            Some((picture, None)) if reverses_on_device(&plan, Some(())) => (picture, from_device()?),
+            Some(made) => made,
+            None => (slot.color.read()?, from_device()?),
+        };
         if let Some(truth) = truth.as_mut().filter(|_| plan.looks_for_itself()) {
             look_for_unknown(truth, &self.planner, &plan, f64::from(self.coords_phase));
         }
@@ -483,6 +530,11 @@ impl Session<'_> {
         }
         Ok(Finished { frame, plan, lod: done.lod, out_of_order: done.out_of_order, times })
     }
+}
+
+/// Whether the device goes through the output frame's pixels: for the picture, or only for the truth at silhouettes, which it lists, so that colours are the same whoever asks for what.
+fn reverses_on_device<T>(plan: &FramePlan, on_host: Option<T>) -> bool {
+    on_host.is_none() || plan.looks_for_itself()
 }
 
 fn ms_since(begun: Instant) -> f64 {

@@ -22,6 +22,7 @@ use crate::{
     shaders::{self, ComposeError},
 };
 
+pub mod host;
 mod key;
 pub mod lens_inverse;
 

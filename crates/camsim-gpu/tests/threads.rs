@@ -31,6 +31,8 @@ fn camera(readout: Readout, exposure_ms: f64, interlace_ms: f64) -> Scenario {
 fn frame(sequence: &Arc<Sequence>, channels: &[Channel], pixels_a_thread: u32) -> (RenderedFrame, PipelineKey) {
     let mut engine = engine();
     engine.set_pixels_a_thread(pixels_a_thread);
+    // The host takes blocks of its own size.
+    engine.set_reverse_on_host(false);
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     let mut found = None;
     let mut keep = |finished: camsim_gpu::engine::Finished| {

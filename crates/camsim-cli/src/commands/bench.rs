@@ -56,7 +56,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let options = Options { cases: args.cases.clone(), quick: args.quick };
     check_files(args)?;
     let engine = Engine::new(AdapterChoice::Best)?;
-    console.note(format_args!("adapter: {}", engine.gpu().adapter));
+    console.note(format_args!("adapter: {}", engine.gpu().describe()));
     let report = measure(&engine, &options, &mut |step| match step {
         Step::Begins(what) => {
             console.note(what);

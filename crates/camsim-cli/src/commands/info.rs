@@ -10,7 +10,9 @@ use crate::{console::Console, failure::Failure};
 
 /// Show graphics adapters, driver and limits, and which one is used
 #[derive(Debug, clap::Args)]
-#[command(after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.")]
+#[command(
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host makes output frames from ideal frames where it can, which takes less time; CAMSIM_REVERSE=device leaves\nthat to the adapter, CAMSIM_REVERSE=host does it beside any adapter. Pictures differ by rounding."
+)]
 pub struct Args {
     /// Print JSON
     #[arg(long)]
@@ -23,6 +25,7 @@ struct Info {
     adapters: Vec<Adapter>,
     max_side_px: u32,
     max_storage_buffer_bytes: u64,
+    reverse_on_host: bool,
     cpu_threads: usize,
 }
 
@@ -45,13 +48,14 @@ impl Adapter {
 /// Prints what this machine renders with.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = Engine::new(AdapterChoice::Best)?;
-    let used = &engine.gpu().adapter;
+    let used = engine.gpu().describe();
     let limits = engine.gpu().device.limits();
     let info = Info {
         version: env!("CARGO_PKG_VERSION"),
         adapters: adapters(AdapterChoice::Best).into_iter().enumerate().map(|(i, adapter)| Adapter::of(adapter, i == 0)).collect(),
         max_side_px: engine.gpu().max_side_px(),
         max_storage_buffer_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
+        reverse_on_host: engine.gpu().reverses_on_host(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
     };
     if args.json {

@@ -140,7 +140,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let oracle = Oracle::new(sequence.clone()).or_bad_input()?;
     let engine = Engine::new(AdapterChoice::Best)?;
     check_size(scenario.camera.size_px, engine.most_pixels_with_truth())?;
-    let adapter = engine.gpu().adapter.to_string();
+    let adapter = engine.gpu().describe();
     let mut session = engine.session::<Infallible>(sequence.clone(), &[Channel::Color, Channel::Coords])?;
     let tolerance_px = scenario.quality.max_error_px;
     let tolerance_dn = scenario.quality.max_error_dn;

@@ -125,6 +125,14 @@ fn place_of_turn([nx, ny]: [u32; 2], turn: u32) -> u32 {
     if nx >= ny { place } else { place % columns * nx + place / columns }
 }
 
+/// Where the reads of a grid of `taps` along each side lie, in the order in which they are read: shares of its sides from the middle on.
+#[must_use]
+pub fn tap_shares(taps: [u32; 2]) -> Vec<[f32; 2]> {
+    let [nx, ny] = taps.map(|n| n.max(1));
+    let share = |cell: u32, of: u32| (f64::from(cell) + 0.5) as f32 / of as f32 - 0.5;
+    (0..nx * ny).map(|turn| place_of_turn([nx, ny], turn)).map(|place| [share(place % nx, nx), share(place / nx, ny)]).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

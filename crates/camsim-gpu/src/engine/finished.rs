@@ -15,6 +15,8 @@ pub struct FrameTimes {
     pub submit_ms: f64,
     /// The host waited for the device.
     pub wait_ms: f64,
+    /// The host made the picture from the ideal frame, where it does that itself ([`crate::reverse::host`]).
+    pub reverse_ms: Option<f64>,
     /// The host took the pictures; and where depth or coordinates are wanted, it looked for itself what pixels at silhouettes see.
     pub read_ms: f64,
     /// What ran on the device, if asked for ([`Session::time_passes`]) and if the adapter has time stamps.

@@ -73,18 +73,83 @@ pub(super) fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
 
 /// All of a buffer.
 pub(super) fn read_buffer<T: bytemuck::Pod>(gpu: &GpuContext, buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
-    let on_host = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.read_buffer"),
-        size: buffer.size(),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
+    let on_host = on_host(gpu, "camsim.read_buffer", buffer.size());
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_buffer") });
     encoder.copy_buffer_to_buffer(buffer, 0, &on_host, 0, buffer.size());
     gpu.queue.submit([encoder.finish()]);
     on_host.slice(..).map_async(wgpu::MapMode::Read, |_| {});
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
     read_mapped(&on_host)
+}
+
+/// A buffer for the top-left texels of a texture, row by row as copies want them.
+#[derive(Debug)]
+pub(super) struct Rows {
+    pub buffer: wgpu::Buffer,
+    label: &'static str,
+    size_px: [u32; 2],
+    /// From one row to the next.
+    pub stride_bytes: u32,
+}
+
+impl Rows {
+    /// For texels of so many bytes.
+    pub fn new(gpu: &GpuContext, label: &'static str, size_px: [u32; 2], texel_bytes: usize) -> Self {
+        let mut rows = Self::empty(gpu, label);
+        rows.fit(gpu, size_px, texel_bytes);
+        rows
+    }
+
+    /// For none yet.
+    pub fn empty(gpu: &GpuContext, label: &'static str) -> Self {
+        Self { buffer: on_host(gpu, label, wgpu::COPY_BUFFER_ALIGNMENT), label, size_px: [0; 2], stride_bytes: 0 }
+    }
+
+    /// Takes texels of so many bytes from now on, and is not mapped any more. The buffer grows, but does not shrink: sizes that come and go need no other one.
+    pub fn fit(&mut self, gpu: &GpuContext, size_px: [u32; 2], texel_bytes: usize) {
+        self.size_px = size_px;
+        self.stride_bytes = (size_px[0] * texel_bytes as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(self.stride_bytes) * u64::from(size_px[1]);
+        match self.buffer.size() < bytes {
+            true => self.buffer = on_host(gpu, self.label, bytes.next_multiple_of(GROWS_BY_BYTES)),
+            false => self.buffer.unmap(),
+        }
+    }
+
+    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture) {
+        encoder.copy_texture_to_buffer(
+            wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(self.stride_bytes), rows_per_image: None },
+            },
+            wgpu::Extent3d { width: self.size_px[0], height: self.size_px[1], depth_or_array_layers: 1 },
+        );
+    }
+
+    /// All of it, once it is mapped.
+    pub fn view(&self) -> Result<wgpu::BufferView, GpuError> {
+        self.buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))
+    }
+
+    /// The texels without what lies between rows, once it is mapped.
+    pub fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
+        let [width, height] = self.size_px;
+        let mut values = Vec::with_capacity(width as usize * height as usize);
+        let row_bytes = width as usize * size_of::<T>();
+        for row in self.view()?.chunks_exact(self.stride_bytes as usize).take(height as usize) {
+            values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&row[..row_bytes]));
+        }
+        Ok(values)
+    }
+}
+
+/// Steps in which buffers for texels grow.
+const GROWS_BY_BYTES: u64 = 1 << 20;
+
+fn on_host(gpu: &GpuContext, label: &str, size: u64) -> wgpu::Buffer {
+    let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+    gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
 }
 
 /// The top-left `width` x `height` texels of a texture.
@@ -94,34 +159,13 @@ pub(super) fn read_texture<T: bytemuck::Pod>(
     width: u32,
     height: u32,
 ) -> Result<Vec<T>, GpuError> {
-    let row = width * size_of::<T>() as u32;
-    let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     // Depth can only be copied whole.
-    let (copy_width, copy_height) = (texture.width(), texture.height());
-    let copy_row = (copy_width * size_of::<T>() as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT).max(padded);
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("camsim.read_texture"),
-        size: u64::from(copy_row) * u64::from(copy_height),
-        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-        mapped_at_creation: false,
-    });
+    let copied = Rows::new(gpu, "camsim.read_texture", [texture.width(), texture.height()], size_of::<T>());
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
-    encoder.copy_texture_to_buffer(
-        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin: wgpu::Origin3d::ZERO, aspect: wgpu::TextureAspect::All },
-        wgpu::TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(copy_row), rows_per_image: None },
-        },
-        wgpu::Extent3d { width: copy_width, height: copy_height, depth_or_array_layers: 1 },
-    );
+    copied.copy(&mut encoder, texture);
     gpu.queue.submit([encoder.finish()]);
-    buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    copied.buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
-    let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
-    let mut values = Vec::with_capacity((width * height) as usize);
-    for y in 0..height {
-        let start = (y * copy_row) as usize;
-        values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&view[start..start + row as usize]));
-    }
-    Ok(values)
+    let all = copied.read::<T>()?;
+    Ok(all.chunks_exact(texture.width() as usize).take(height as usize).flat_map(|row| &row[..width as usize]).copied().collect())
 }

@@ -46,6 +46,7 @@ impl Session<'_> {
         self.lens_map = None;
         self.zoom_maps.clear();
         self.vignette = vignette(gpu, &sequence);
+        self.on_host.iter_mut().for_each(|on_host| on_host.renew(&sequence));
         // Bind groups hold what has just been replaced.
         self.targets.iter_mut().flat_map(|target| &mut target.groups).for_each(|groups| groups.clear());
         self.planner = planner;
@@ -98,12 +99,17 @@ pub(super) fn noise_table(gpu: &GpuContext) -> wgpu::TextureView {
     table(gpu, "camsim.noise_table", size, wgpu::TextureFormat::Rg32Float, segments.as_flattened())
 }
 
-/// Weights of the vignette map at every pixel; one for all without a map.
-pub(super) fn vignette(gpu: &GpuContext, sequence: &Sequence) -> wgpu::TextureView {
+/// Weights of the vignette map at every pixel, and the size of their picture; one for all without a map.
+pub(super) fn vignette_weights_of(sequence: &Sequence) -> ([u32; 2], Vec<f32>) {
     let camera = &sequence.scenario.camera;
-    let (size, weights) = match &sequence.vignette {
+    match &sequence.vignette {
         Some(map) => (camera.size_px, vignette_weights(map, camera.size_px, camera.photometric.vignette_thresholds)),
         None => ([1, 1], vec![1.0]),
-    };
+    }
+}
+
+/// The same for the device.
+pub(super) fn vignette(gpu: &GpuContext, sequence: &Sequence) -> wgpu::TextureView {
+    let (size, weights) = vignette_weights_of(sequence);
     table(gpu, "camsim.vignette", size, wgpu::TextureFormat::R32Float, &weights)
 }

@@ -54,9 +54,10 @@ impl Slot {
         }
     }
 
-    /// Once the frame has been submitted: asks for what the host reads, and for what it writes the next one to.
-    pub fn recall(&mut self) {
-        let outputs = [Some(&self.color), self.truth.as_ref()].into_iter().flatten().map(|output| &output.on_host);
+    /// Once the frame has been submitted: asks for what the host reads of it, and for what it writes the next one to.
+    pub fn recall(&mut self, has_color: bool, has_truth: bool) {
+        let color = has_color.then_some(&self.color);
+        let outputs = color.into_iter().chain(self.truth.as_ref().filter(|_| has_truth)).map(|output| &output.on_host);
         for on_host in outputs.chain(self.clock.as_ref().map(PassClock::on_host)) {
             // A failed mapping shows when the range is read.
             on_host.map_async(wgpu::MapMode::Read, .., |_| {});

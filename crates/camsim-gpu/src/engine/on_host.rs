@@ -1,0 +1,142 @@
+//! Frames whose reverse pipeline runs on the host: what they read of the device, and what stays from frame to frame.
+
+use camsim_core::{
+    plan::{FramePlan, RayStage},
+    sequence::Sequence,
+    temporal::IdealGeometry,
+};
+
+use super::readback::Rows;
+use crate::{
+    context::{GpuContext, GpuError},
+    ideal::IdealTarget,
+    layout::{FrameUniforms, Truth},
+    recorder::Recorder,
+    reverse::{
+        host::{HostInputs, HostKernel, IdealOnHost, LensMapOnHost},
+        lens_inverse::LensMap,
+    },
+};
+
+/// Copies of ideal frames: one for a frame at work, one for the frame in flight after it.
+const COPIES: usize = 2;
+/// Of a texel: four half floats, a float.
+const COLOR_BYTES: usize = 8;
+const DEPTH_BYTES: usize = 4;
+
+/// A frame's own numbers.
+#[derive(Debug)]
+pub(super) struct HostFrame {
+    /// Which copy of an ideal frame it reads.
+    copy: usize,
+    uniforms: FrameUniforms,
+}
+
+/// An ideal frame in memory that the host reads, mapped from its submission until it is used again.
+#[derive(Debug)]
+struct Copy {
+    color: Rows,
+    depth: Rows,
+}
+
+/// What stays from frame to frame.
+#[derive(Debug)]
+pub(super) struct OnHost {
+    kernel: HostKernel,
+    vignette: Vec<f32>,
+    map: Option<LensMapOnHost>,
+    /// The lens map on its way.
+    map_copy: Option<Rows>,
+    copies: [Copy; COPIES],
+    last: usize,
+    /// What the commands at work copy, to be asked for once they have been submitted.
+    recorded: Vec<wgpu::Buffer>,
+}
+
+impl OnHost {
+    pub fn new(gpu: &GpuContext, sequence: &Sequence) -> Self {
+        Self {
+            kernel: HostKernel::new(),
+            vignette: super::renew::vignette_weights_of(sequence).1,
+            map: None,
+            map_copy: None,
+            copies: [(); COPIES]
+                .map(|()| Copy { color: Rows::empty(gpu, "camsim.ideal_color"), depth: Rows::empty(gpu, "camsim.ideal_depth") }),
+            last: 0,
+            recorded: Vec::new(),
+        }
+    }
+
+    /// Forgets what was recorded and never submitted.
+    pub fn forget(&mut self) {
+        self.recorded.clear();
+        self.map_copy = None;
+    }
+
+    /// Another camera, over the same scene.
+    pub fn renew(&mut self, sequence: &Sequence) {
+        self.forget();
+        self.map = None;
+        self.vignette = super::renew::vignette_weights_of(sequence).1;
+    }
+
+    /// Records the lens map's way to the host, once.
+    pub fn copy_map(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, map: Option<&LensMap>) {
+        let Some(map) = map.filter(|_| plan.ray == RayStage::LensMap && self.map.is_none() && self.map_copy.is_none()) else { return };
+        let rows = Rows::new(gpu, "camsim.lens_map", [map.texture.width(), map.texture.height()], size_of::<[f32; 2]>());
+        rows.copy(recorder.encoder(), &map.texture);
+        self.recorded.push(rows.buffer.clone());
+        self.map_copy = Some(rows);
+    }
+
+    /// Records an ideal frame's way to the host; which copy it is.
+    pub fn copy_ideal(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, target: &IdealTarget, ideal: &IdealGeometry) -> usize {
+        // The frame in flight may still read the other one.
+        self.last = (self.last + 1) % COPIES;
+        let copy = &mut self.copies[self.last];
+        // Depth can only be copied whole.
+        let whole = [target.depth.width(), target.depth.height()];
+        for (rows, size_px, texture, texel_bytes) in
+            [(&mut copy.color, ideal.size_px, &target.color, COLOR_BYTES), (&mut copy.depth, whole, &target.depth, DEPTH_BYTES)]
+        {
+            rows.fit(gpu, size_px, texel_bytes);
+            rows.copy(recorder.encoder(), texture);
+            self.recorded.push(rows.buffer.clone());
+        }
+        self.last
+    }
+
+    /// Once the commands have been submitted: asks for what they copy.
+    pub fn recall(&mut self) {
+        for buffer in self.recorded.drain(..) {
+            // A failed mapping shows when the range is read.
+            buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        }
+    }
+
+    pub fn frame(copy: usize, uniforms: FrameUniforms) -> HostFrame {
+        HostFrame { copy, uniforms }
+    }
+
+    /// The picture of a frame whose commands are done, linear R G B A, and the truth about it where that is wanted.
+    pub fn render(
+        &mut self,
+        plan: &FramePlan,
+        frame: &HostFrame,
+        poses: &[[[f32; 4]; 3]],
+    ) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
+        if let Some(rows) = self.map_copy.take() {
+            self.map = Some(LensMapOnHost { uv: rows.read()? });
+        }
+        let copy = &self.copies[frame.copy];
+        let (color, depth) = (copy.color.view()?, copy.depth.view()?);
+        let ideal = IdealOnHost {
+            color: bytemuck::try_cast_slice(&color).map_err(|error| GpuError::Device(error.to_string()))?,
+            color_stride: copy.color.stride_bytes / COLOR_BYTES as u32,
+            depth: bytemuck::try_cast_slice(&depth).map_err(|error| GpuError::Device(error.to_string()))?,
+            depth_stride: copy.depth.stride_bytes / DEPTH_BYTES as u32,
+        };
+        let inputs = HostInputs { frame: &frame.uniforms, poses, map: self.map.as_ref(), vignette: &self.vignette, ideal };
+        Ok(self.kernel.render(plan, &inputs))
+    }
+}

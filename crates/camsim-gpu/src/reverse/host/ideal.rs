@@ -1,0 +1,105 @@
+//! Reads of the ideal frame.
+
+use super::{
+    lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within},
+    vectors::Vectors,
+};
+use crate::layout::FrameUniforms;
+
+/// Half floats of a texel.
+const CHANNELS: usize = 4;
+
+/// An ideal frame in the host's memory, as the device has copied it.
+#[derive(Clone, Copy, Debug)]
+pub struct IdealOnHost<'a> {
+    /// Linear R G B A, half floats.
+    pub color: &'a [u16],
+    /// Texels from one row to the next.
+    pub color_stride: u32,
+    /// Reversed depth, near / z.
+    pub depth: &'a [f32],
+    /// The same of depths.
+    pub depth_stride: u32,
+}
+
+/// Where four texels around a place begin, and how far the place is from the first to the last.
+struct Around {
+    first: [u32; LANES],
+    t: Lanes2,
+}
+
+/// Of the frame; places outside go to its border. Frames are at least two texels wide and high.
+#[inline(always)]
+fn around(frame: &FrameUniforms, at_px: &Lanes2, stride: u32) -> Around {
+    let last = frame.ideal_size_px.map(|size| (size - 1) as f32);
+    let at = Lanes2 { x: each(|i| within(at_px.x[i], last[0])), y: each(|i| within(at_px.y[i], last[1])) };
+    let x = each(|i| within(at.x[i].floor(), last[0] - 1.0));
+    let y = each(|i| within(at.y[i].floor(), last[1] - 1.0));
+    let mut first = [0; LANES];
+    for i in 0..LANES {
+        first[i] = whole(y[i]) * stride + whole(x[i]);
+    }
+    Around { first, t: at.minus(&Lanes2 { x, y }) }
+}
+
+impl IdealOnHost<'_> {
+    /// Inverse planar depth, 1/m: bilinear, which is exact on planes; the nearest texel where the four belong to different surfaces.
+    #[inline(always)]
+    pub(super) fn inverse_depth(&self, frame: &FrameUniforms, at_px: &Lanes2) -> Lanes {
+        let Around { first, t } = around(frame, at_px, self.depth_stride);
+        let (mut top, mut bottom) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);
+        let span = self.depth_stride as usize + 2;
+        for i in 0..LANES {
+            [top[i], bottom[i]] = ends(self.depth, first[i] as usize, span);
+        }
+        let [d00, d10] = [0, 1].map(|column| each(|i| top[i][column]));
+        let [d01, d11] = [0, 1].map(|column| each(|i| bottom[i][column]));
+        let per_m = 1.0 / frame.near_m;
+        each(|i| {
+            let low = lower(lower(d00[i], d10[i]), lower(d01[i], d11[i]));
+            let high = higher(higher(d00[i], d10[i]), higher(d01[i], d11[i]));
+            let top = t.x[i].mul_add(d10[i] - d00[i], d00[i]);
+            let bottom = t.x[i].mul_add(d11[i] - d01[i], d01[i]);
+            let mixed = t.y[i].mul_add(bottom - top, top);
+            let top = if t.x[i] > 0.5 { d10[i] } else { d00[i] };
+            let bottom = if t.x[i] > 0.5 { d11[i] } else { d01[i] };
+            let nearest = if t.y[i] > 0.5 { bottom } else { top };
+            per_m * if low > 0.9 * high { mixed } else { nearest }
+        })
+    }
+
+    /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one.
+    #[inline(always)]
+    pub(super) fn add_color(
+        &self,
+        vectors: impl Vectors,
+        frame: &FrameUniforms,
+        at_px: &Lanes2,
+        is_taken: impl Fn(usize) -> bool,
+        weight: impl Fn(usize) -> f32,
+        sum: &mut [[f32; 4]; LANES],
+    ) {
+        let Around { first, t } = around(frame, at_px, self.color_stride);
+        let span = CHANNELS * (self.color_stride as usize + 2);
+        for i in 0..LANES {
+            if !is_taken(i) {
+                continue;
+            }
+            let [top, bottom] = ends(self.color, CHANNELS * first[i] as usize, span).map(|halves| vectors.numbers(halves));
+            let mut between = [0.0; 8];
+            for k in 0..8 {
+                between[k] = t.y[i].mul_add(bottom[k] - top[k], top[k]);
+            }
+            for k in 0..4 {
+                sum[i][k] += weight(i) * t.x[i].mul_add(between[k + 4] - between[k], between[k]);
+            }
+        }
+    }
+}
+
+/// The first and the last values of so many from a place on; zeros beyond the end, where no place within the frame leads.
+#[inline(always)]
+fn ends<T: Copy + Default, const N: usize>(values: &[T], at: usize, span: usize) -> [[T; N]; 2] {
+    let of = values.get(at..at + span).and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
+    of.unwrap_or([[T::default(); N]; 2])
+}
