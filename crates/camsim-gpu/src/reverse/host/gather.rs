@@ -5,6 +5,7 @@ use camsim_core::plan::PathStage;
 use super::{
     Reads,
     footprint::{Footprint, Spline},
+    ideal::Halves,
     lanes::{LANES, Lanes, Lanes2, ZERO, each},
     source::{Nodes, Pose, Source},
     vectors::Vectors,
@@ -169,7 +170,7 @@ impl Reads<'_> {
         let steps = curve.path.steps() as f32;
         let share = each(|i| 1.0 / count[i].max(1.0));
         let most = count.iter().fold(0.0, |most: f32, &count| most.max(count));
-        let mut of_curve = [[0.0; 4]; LANES];
+        let mut of_curve = [[0.0; 8]; LANES];
         let mut sample = 0.0;
         while sample < most {
             let step = each(|i| steps * share[i] * (sample + 0.5));
@@ -179,7 +180,7 @@ impl Reads<'_> {
         }
         for i in 0..LANES {
             for k in 0..4 {
-                sum[i][k] += of_curve[i][k] * share[i];
+                sum[i][k] += (of_curve[i][k] + of_curve[i][k + 4]) * share[i];
             }
         }
     }
@@ -193,7 +194,7 @@ impl Reads<'_> {
         area: &Footprint<'_>,
         tap: impl Fn(usize) -> f32,
         is_taken: impl Fn(usize) -> bool,
-        sum: &mut [[f32; 4]; LANES],
+        sum: &mut [Halves; LANES],
     ) {
         let Some(softness) = &area.softness else {
             return self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum);

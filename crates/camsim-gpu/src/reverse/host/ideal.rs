@@ -9,6 +9,9 @@ use crate::layout::FrameUniforms;
 /// Half floats of a texel.
 const CHANNELS: usize = 4;
 
+/// Colours of the left and of the right texels that a pixel's reads lie between, to be added in the end: R G B A each.
+pub(super) type Halves = [f32; 2 * CHANNELS];
+
 /// An ideal frame in the host's memory, as the device has copied it.
 #[derive(Clone, Copy, Debug)]
 pub struct IdealOnHost<'a> {
@@ -68,7 +71,7 @@ impl IdealOnHost<'_> {
         })
     }
 
-    /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one.
+    /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one: what its left texels give and what its right ones do.
     #[inline(always)]
     pub(super) fn add_color(
         &self,
@@ -77,7 +80,7 @@ impl IdealOnHost<'_> {
         at_px: &Lanes2,
         is_taken: impl Fn(usize) -> bool,
         weight: impl Fn(usize) -> f32,
-        sum: &mut [[f32; 4]; LANES],
+        sum: &mut [Halves; LANES],
     ) {
         let Around { first, t } = around(frame, at_px, self.color_stride);
         let span = CHANNELS * (self.color_stride as usize + 2);
@@ -86,12 +89,11 @@ impl IdealOnHost<'_> {
                 continue;
             }
             let [top, bottom] = ends(self.color, CHANNELS * first[i] as usize, span).map(|halves| vectors.numbers(halves));
-            let mut between = [0.0; 8];
-            for k in 0..8 {
-                between[k] = t.y[i].mul_add(bottom[k] - top[k], top[k]);
-            }
-            for k in 0..4 {
-                sum[i][k] += weight(i) * t.x[i].mul_add(between[k + 4] - between[k], between[k]);
+            for k in 0..2 * CHANNELS {
+                let between = t.y[i].mul_add(bottom[k] - top[k], top[k]);
+                // Left texels come first.
+                let share = if k < CHANNELS { 1.0 - t.x[i] } else { t.x[i] };
+                sum[i][k] = (weight(i) * share).mul_add(between, sum[i][k]);
             }
         }
     }
