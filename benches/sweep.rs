@@ -2,7 +2,7 @@
 //! preset of the same frames in the same rounds; what the houses of `benches/houses.toml` add to their terrain; and what the plan takes ways of
 //! sampling to cost beside what they take.
 //!
-//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `passes`,
+//! `cargo bench --bench sweep` makes all tables, `cargo bench --bench sweep -- blur files` these two (`size`, `blur`, `effects`, `alike`, `passes`,
 //! `houses`, `costs`, `files`); `CAMSIM_ADAPTER=part-of-a-name` picks the adapter.
 
 #![allow(clippy::print_stdout, reason = "the tables are what this program is for")]
@@ -47,12 +47,13 @@ fn main() -> Outcome<()> {
     let (measuring, wanted): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|argument| argument == "--bench");
     let is_measuring = !measuring.is_empty();
     let engine = Engine::new(AdapterChoice::Best)?;
-    println!("adapter   {}", engine.gpu().adapter);
+    println!("adapter   {}", engine.gpu().describe());
     println!("frames    of benches/all_effects.toml, 640x480 unless told otherwise; read back, nothing encoded but for the last table");
     let tables = [
         ("size", size as fn(&Engine, bool) -> Outcome<()>),
         ("blur", blur),
         ("effects", effects),
+        ("alike", alike),
         ("passes", passes),
         ("houses", houses),
         ("costs", costs),
@@ -137,6 +138,27 @@ fn effects(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     measure(&mut variants, 96, effort)?;
     println!("{}", say_rounds(&variants, effort));
     print_against(&variants, "variant");
+    Ok(())
+}
+
+/// The same, but sampled alike whatever the error: what stages cost, where `effects` tells what frames do.
+fn alike(engine: &Engine, is_measuring: bool) -> Outcome<()> {
+    let one_way = [
+        ("quality.ideal_scale", "1.0"),
+        ("quality.footprint_taps", "1"),
+        ("quality.silhouettes", "\"plain\""),
+        ("quality.frames_per_ideal", "4"),
+        ("quality.max_error_dn", "8"),
+    ];
+    let whole = changed(&one_way.map(|(key, value)| (key, value.to_owned())))?;
+    let mut variants = Vec::new();
+    for (name, without) in EFFECTS.into_iter().take(if is_measuring { EFFECTS.len() } else { 1 }) {
+        variants.push(Variant::open(name, engine, without.of(&whole)?, &[Channel::Color])?);
+    }
+    let effort = effort(EFFORT, is_measuring);
+    measure(&mut variants, 96, effort)?;
+    println!("{}", say_rounds(&variants, effort));
+    print_against(&variants, "variant, all sampled alike");
     Ok(())
 }
 
@@ -388,11 +410,12 @@ fn files(is_measuring: bool) -> Outcome<()> {
 
 /// Times of all variants, and of each how many times as fast as the preset it is.
 fn print_against(variants: &[Variant<'_>], head: &str) {
-    println!("| {head} | ms a frame | frames/s | to the first | processor ms a frame | to the first | times the preset's rate |");
+    let preset = variants.iter().find(|variant| variant.name.contains(PRESET));
+    let base = if preset.is_some() { "preset" } else { "first" };
+    println!("| {head} | ms a frame | frames/s | to the first | processor ms a frame | to the first | times the {base}'s rate |");
     println!("|---{}|---|---|---|---|---|---|", "|---".repeat(head.matches('|').count()));
-    let preset = variants.iter().find(|variant| variant.name.contains(PRESET)).unwrap_or(&variants[0]);
     for variant in variants {
-        let faster = ratio(&preset.ms, &variant.ms);
+        let faster = ratio(&preset.unwrap_or(&variants[0]).ms, &variant.ms);
         println!("| {} | {} | {faster:.2} |", variant.name, times(variant, &variants[0]).join(" | "));
     }
 }

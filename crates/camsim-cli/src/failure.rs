@@ -72,7 +72,7 @@ impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
         let code = match error {
             GpuError::NoAdapter(_) => NO_ADAPTER,
-            GpuError::TooLarge { .. } => BAD_INPUT,
+            GpuError::TooLarge { .. } | GpuError::Setting { .. } => BAD_INPUT,
             _ => FAILED,
         };
         Self { code, error: error.into() }

@@ -43,7 +43,8 @@ Exit codes:
   2  wrong usage or bad input: the message says where, and what to do
   3  no usable graphics adapter
 
-CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`).";
+CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`). CAMSIM_REVERSE=device or host says where output frames are made from
+ideal frames (`camsim info --help`).";
 
 /// Pictures of a real, imperfect airborne camera, and the truth about them.
 #[derive(Debug, Parser)]

@@ -40,13 +40,13 @@ impl TimesTable {
             ("host: record", times.record_ms),
             ("host: submit", times.submit_ms),
             ("host: wait", times.wait_ms),
-            ("host: read", times.read_ms),
         ] {
             self.part(name.to_owned(), ms);
         }
         if let Some(ms) = times.reverse_ms {
             self.part("host: reverse".to_owned(), ms);
         }
+        self.part("host: read".to_owned(), times.read_ms);
         for pass in &times.passes {
             self.part(format!("device: {}", pass.name), pass.ms);
         }

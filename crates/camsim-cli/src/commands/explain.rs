@@ -7,6 +7,7 @@ use camsim_core::{
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
+use camsim_gpu::reverse::host;
 use camsim_io::{load::Loaded, terrain::TerrainSummary};
 use serde::Serialize;
 
@@ -157,6 +158,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
+    if host::serves(&plan) {
+        console.line(format_args!("on a software adapter the host runs the reverse pipeline of this frame (`camsim info --help`)"))?;
+    }
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {
         console.line("terrain in this frame")?;
         console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;

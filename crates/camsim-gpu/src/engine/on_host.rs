@@ -49,8 +49,14 @@ pub(super) struct OnHost {
     map_copy: Option<Rows>,
     copies: [Copy; COPIES],
     last: usize,
-    /// What the commands at work copy, to be asked for once they have been submitted.
-    recorded: Vec<wgpu::Buffer>,
+    recorded: Recorded,
+}
+
+/// What the commands at work copy, to be asked for once they have been submitted.
+#[derive(Debug, Default)]
+struct Recorded {
+    map: Option<Rows>,
+    copy: Option<usize>,
 }
 
 impl OnHost {
@@ -63,30 +69,29 @@ impl OnHost {
             copies: [(); COPIES]
                 .map(|()| Copy { color: Rows::empty(gpu, "camsim.ideal_color"), depth: Rows::empty(gpu, "camsim.ideal_depth") }),
             last: 0,
-            recorded: Vec::new(),
+            recorded: Recorded::default(),
         }
     }
 
     /// Forgets what was recorded and never submitted.
     pub fn forget(&mut self) {
-        self.recorded.clear();
-        self.map_copy = None;
+        self.recorded = Recorded::default();
     }
 
     /// Another camera, over the same scene.
     pub fn renew(&mut self, sequence: &Sequence) {
         self.forget();
-        self.map = None;
+        (self.map, self.map_copy) = (None, None);
         self.vignette = super::renew::vignette_weights_of(sequence).1;
     }
 
     /// Records the lens map's way to the host, once.
     pub fn copy_map(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, plan: &FramePlan, map: Option<&LensMap>) {
-        let Some(map) = map.filter(|_| plan.ray == RayStage::LensMap && self.map.is_none() && self.map_copy.is_none()) else { return };
+        let is_known = self.map.is_some() || self.map_copy.is_some();
+        let Some(map) = map.filter(|_| plan.ray == RayStage::LensMap && !is_known) else { return };
         let rows = Rows::new(gpu, "camsim.lens_map", [map.texture.width(), map.texture.height()], size_of::<[f32; 2]>());
         rows.copy(recorder.encoder(), &map.texture);
-        self.recorded.push(rows.buffer.clone());
-        self.map_copy = Some(rows);
+        self.recorded.map = Some(rows);
     }
 
     /// Records an ideal frame's way to the host; which copy it is.
@@ -101,16 +106,21 @@ impl OnHost {
         {
             rows.fit(gpu, size_px, texel_bytes);
             rows.copy(recorder.encoder(), texture);
-            self.recorded.push(rows.buffer.clone());
         }
+        self.recorded.copy = Some(self.last);
         self.last
     }
 
     /// Once the commands have been submitted: asks for what they copy.
     pub fn recall(&mut self) {
-        for buffer in self.recorded.drain(..) {
-            // A failed mapping shows when the range is read.
-            buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        let Recorded { map, copy } = std::mem::take(&mut self.recorded);
+        if let Some(mut map) = map {
+            map.recall();
+            self.map_copy = Some(map);
+        }
+        if let Some(copy) = copy.map(|copy| &mut self.copies[copy]) {
+            copy.color.recall();
+            copy.depth.recall();
         }
     }
 
@@ -127,6 +137,9 @@ impl OnHost {
     ) -> Result<(Vec<f32>, Option<Vec<Truth>>), GpuError> {
         if let Some(rows) = self.map_copy.take() {
             self.map = Some(LensMapOnHost { uv: rows.read()? });
+        }
+        if plan.ray == RayStage::LensMap && self.map.is_none() {
+            return Err(GpuError::Device("there is no lens map on the host".into()));
         }
         let copy = &self.copies[frame.copy];
         let (color, depth) = (copy.color.view()?, copy.depth.view()?);

@@ -85,11 +85,13 @@ pub(super) fn read_buffer<T: bytemuck::Pod>(gpu: &GpuContext, buffer: &wgpu::Buf
 /// A buffer for the top-left texels of a texture, row by row as copies want them.
 #[derive(Debug)]
 pub(super) struct Rows {
-    pub buffer: wgpu::Buffer,
+    buffer: wgpu::Buffer,
     label: &'static str,
     size_px: [u32; 2],
     /// From one row to the next.
     pub stride_bytes: u32,
+    /// Whether the host has it, or has asked for it.
+    is_asked_for: bool,
 }
 
 impl Rows {
@@ -102,7 +104,7 @@ impl Rows {
 
     /// For none yet.
     pub fn empty(gpu: &GpuContext, label: &'static str) -> Self {
-        Self { buffer: on_host(gpu, label, wgpu::COPY_BUFFER_ALIGNMENT), label, size_px: [0; 2], stride_bytes: 0 }
+        Self { buffer: on_host(gpu, label, wgpu::COPY_BUFFER_ALIGNMENT), label, size_px: [0; 2], stride_bytes: 0, is_asked_for: false }
     }
 
     /// Takes texels of so many bytes from now on, and is not mapped any more. The buffer grows, but does not shrink: sizes that come and go need no other one.
@@ -110,10 +112,18 @@ impl Rows {
         self.size_px = size_px;
         self.stride_bytes = (size_px[0] * texel_bytes as u32).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let bytes = u64::from(self.stride_bytes) * u64::from(size_px[1]);
-        match self.buffer.size() < bytes {
-            true => self.buffer = on_host(gpu, self.label, bytes.next_multiple_of(GROWS_BY_BYTES)),
-            false => self.buffer.unmap(),
+        if std::mem::take(&mut self.is_asked_for) {
+            self.buffer.unmap();
         }
+        if self.buffer.size() < bytes {
+            self.buffer = on_host(gpu, self.label, bytes.next_multiple_of(GROWS_BY_BYTES));
+        }
+    }
+
+    /// Once the copy has been submitted: asks for it. A failure shows when it is read.
+    pub fn recall(&mut self) {
+        self.is_asked_for = true;
+        self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
     pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, texture: &wgpu::Texture) {
@@ -160,11 +170,11 @@ pub(super) fn read_texture<T: bytemuck::Pod>(
     height: u32,
 ) -> Result<Vec<T>, GpuError> {
     // Depth can only be copied whole.
-    let copied = Rows::new(gpu, "camsim.read_texture", [texture.width(), texture.height()], size_of::<T>());
+    let mut copied = Rows::new(gpu, "camsim.read_texture", [texture.width(), texture.height()], size_of::<T>());
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("camsim.read_texture") });
     copied.copy(&mut encoder, texture);
     gpu.queue.submit([encoder.finish()]);
-    copied.buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    copied.recall();
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
     let all = copied.read::<T>()?;
     Ok(all.chunks_exact(texture.width() as usize).take(height as usize).flat_map(|row| &row[..width as usize]).copied().collect())

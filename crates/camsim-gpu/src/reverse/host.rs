@@ -38,6 +38,8 @@ use source::Pose;
 use vectors::Avx2;
 use vectors::{Any, Vectors};
 
+/// Pixels of an ideal frame for each pixel that is made from it, at most: to copy one takes an eighth of what it saves to make one here.
+const MOST_COPIED: f64 = 6.0;
 /// Rows that a task takes.
 const ROWS_A_TASK: usize = 16;
 
@@ -50,8 +52,8 @@ pub fn suits_processor() -> bool {
     cfg!(target_arch = "aarch64")
 }
 
-/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes, by a lens that stays, lines that are rows, and grids of few reads. That
-/// is what frames are by default.
+/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes, by a lens that stays, lines that are rows, grids of few reads, and an ideal frame not much larger than
+/// they are. That is what frames are by default.
 #[must_use]
 pub fn serves(plan: &FramePlan) -> bool {
     let key = PipelineKey::of(plan);
@@ -63,7 +65,15 @@ pub fn serves(plan: &FramePlan) -> bool {
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most <= MOST_TAPS,
         TapStage::Bilinear | TapStage::Spline => true,
     };
-    is_plain && solves && keeps_lens && has_rows && has_few_taps && plan.ideal.size_px.iter().all(|&side| side >= 2)
+    let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
+    is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides && is_worth_the_copy(plan)
+}
+
+/// Whether an ideal frame is brought here in less time than its output frames save.
+fn is_worth_the_copy(plan: &FramePlan) -> bool {
+    let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
+    let frames = plan.shared_by.map_or(1.0, |[first, last]| (last - first + 1) as f64);
+    area(plan.ideal.size_px) <= MOST_COPIED * frames * area(plan.camera.size_px)
 }
 
 /// What stays from frame to frame.
