@@ -20,7 +20,6 @@ use crate::{
     upload::SceneBuffers,
 };
 use camsim_core::{
-    frame::RenderedFrame,
     plan::{EdgeStage, FramePlan, Planner, RayStage, SurfaceReads},
     pose::CameraPose,
     scenario::Channel,
@@ -42,10 +41,10 @@ mod slot;
 use ahead::{Ahead, Lines, Prepared, Preparer};
 pub use error::RenderError;
 pub(crate) use error::RenderErrorBase;
+use finished::reverses_on_device;
 pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
 use on_host::{HostFrame, OnHost};
-use readback::{Output, coords, look_for_unknown, read_mapped};
 use renew::{noise_table, vignette};
 use slot::{Slot, Target, list_buffer, pose_buffer};
 
@@ -350,7 +349,7 @@ impl Session<'_> {
         on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));
         let target = &self.targets[drawn.target].ideal;
         let copy = *drawn.copy.get_or_insert_with(|| on_host.copy_ideal(gpu, recorder, target, &plan.ideal));
-        Some(OnHost::frame(copy, frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase)))
+        Some(HostFrame { copy, uniforms: frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase) })
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
@@ -486,55 +485,6 @@ impl Session<'_> {
         let groups = &mut target.groups[slot];
         self.reverse_pass.encode(gpu, recorder, plan, &bindings, groups)
     }
-
-    /// Waits for a frame and takes its pictures.
-    fn finish(&mut self, done: InFlight) -> Result<Finished, GpuError> {
-        let gpu = &self.engine.gpu;
-        let wait = wgpu::PollType::Wait { submission_index: Some(done.submission), timeout: None };
-        let mut times = done.times;
-        let begun = Instant::now();
-        gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
-        self.engine.check()?;
-        times.wait_ms = ms_since(begun);
-        let plan = done.plan;
-        let begun = Instant::now();
-        let by_host = match (&mut self.on_host, &done.on_host) {
-            (Some(on_host), Some((frame, Lines::Poses(poses)))) => Some(on_host.render(&plan, frame, &poses.entries)?),
-            _ => None,
-        };
-        times.reverse_ms = by_host.as_ref().map(|_| ms_since(begun));
-        let begun = Instant::now();
-        let slot = &self.slots[done.slot];
-        let from_device = || slot.truth.as_ref().map(Output::read::<Truth>).transpose();
-        let (color_rgba, mut truth) = match by_host {
-            Some((picture, None)) if reverses_on_device(&plan, Some(())) => (picture, from_device()?),
-            Some(made) => made,
-            None => (slot.color.read()?, from_device()?),
-        };
-        if let Some(truth) = truth.as_mut().filter(|_| plan.looks_for_itself()) {
-            look_for_unknown(truth, &self.planner, &plan, f64::from(self.coords_phase));
-        }
-        let size_px = plan.camera.size_px;
-        let frame = RenderedFrame {
-            index: plan.frame,
-            stamp_ns: self.planner.sequence().epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
-            size_px,
-            color_rgba,
-            depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
-            coords: truth.as_ref().map(|truth| coords(truth, &plan)),
-            rows: self.planner.rows(&plan),
-        };
-        times.read_ms = ms_since(begun);
-        if let Some(clock) = &slot.clock {
-            times.passes = clock.passes(gpu, &read_mapped(clock.on_host())?);
-        }
-        Ok(Finished { frame, plan, lod: done.lod, out_of_order: done.out_of_order, times })
-    }
-}
-
-/// Whether the device goes through the output frame's pixels: for the picture, or only for the truth at silhouettes, which it lists, so that colours are the same whoever asks for what.
-fn reverses_on_device<T>(plan: &FramePlan, on_host: Option<T>) -> bool {
-    on_host.is_none() || plan.looks_for_itself()
 }
 
 fn ms_since(begun: Instant) -> f64 {

@@ -1,8 +1,16 @@
-//! What a session hands over: the frame, how it was made, and where its time went.
+//! What a session hands over: the frame, how it was made, and where its time went; and how that is taken from device and host.
+
+use std::time::Instant;
 
 use camsim_core::{frame::RenderedFrame, plan::FramePlan, scene::LodSelection};
 
-use crate::recorder::PassTime;
+use super::{
+    InFlight, Session,
+    ahead::Lines,
+    ms_since,
+    readback::{Output, coords, look_for_unknown, read_mapped},
+};
+use crate::{context::GpuError, layout::Truth, recorder::PassTime};
 
 /// Where a frame's time went, ms. Frames overlap: while one is waited for, the device may still be at the one before.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -36,4 +44,55 @@ pub struct Finished {
     pub out_of_order: u32,
     /// Where its time went.
     pub times: FrameTimes,
+}
+
+impl Session<'_> {
+    /// Waits for a frame and takes its pictures.
+    pub(super) fn finish(&mut self, done: InFlight) -> Result<Finished, GpuError> {
+        let gpu = &self.engine.gpu;
+        let wait = wgpu::PollType::Wait { submission_index: Some(done.submission), timeout: None };
+        let mut times = done.times;
+        let begun = Instant::now();
+        gpu.device.poll(wait).map_err(|error| GpuError::Device(error.to_string()))?;
+        self.engine.check()?;
+        times.wait_ms = ms_since(begun);
+        let plan = done.plan;
+        let begun = Instant::now();
+        let by_host = match (&mut self.on_host, &done.on_host) {
+            (Some(on_host), Some((frame, Lines::Poses(poses)))) => Some(on_host.render(&plan, frame, &poses.entries)?),
+            _ => None,
+        };
+        times.reverse_ms = by_host.as_ref().map(|_| ms_since(begun));
+        let begun = Instant::now();
+        let slot = &self.slots[done.slot];
+        let from_device = || slot.truth.as_ref().map(Output::read::<Truth>).transpose();
+        let (color_rgba, mut truth) = match by_host {
+            Some((picture, None)) if reverses_on_device(&plan, Some(())) => (picture, from_device()?),
+            Some(made) => made,
+            None => (slot.color.read()?, from_device()?),
+        };
+        if let Some(truth) = truth.as_mut().filter(|_| plan.looks_for_itself()) {
+            look_for_unknown(truth, &self.planner, &plan, f64::from(self.coords_phase));
+        }
+        let size_px = plan.camera.size_px;
+        let frame = RenderedFrame {
+            index: plan.frame,
+            stamp_ns: self.planner.sequence().epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
+            size_px,
+            color_rgba,
+            depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
+            coords: truth.as_ref().map(|truth| coords(truth, &plan)),
+            rows: self.planner.rows(&plan),
+        };
+        times.read_ms = ms_since(begun);
+        if let Some(clock) = &slot.clock {
+            times.passes = clock.passes(gpu, &read_mapped(clock.on_host())?);
+        }
+        Ok(Finished { frame, plan, lod: done.lod, out_of_order: done.out_of_order, times })
+    }
+}
+
+/// Whether the device goes through the output frame's pixels: for the picture, or only for the truth at silhouettes, which it lists, so that colours are the same whoever asks for what.
+pub(super) fn reverses_on_device<T>(plan: &FramePlan, on_host: Option<T>) -> bool {
+    on_host.is_none() || plan.looks_for_itself()
 }

@@ -28,8 +28,8 @@ const DEPTH_BYTES: usize = 4;
 #[derive(Debug)]
 pub(super) struct HostFrame {
     /// Which copy of an ideal frame it reads.
-    copy: usize,
-    uniforms: FrameUniforms,
+    pub copy: usize,
+    pub uniforms: FrameUniforms,
 }
 
 /// An ideal frame in memory that the host reads, mapped from its submission until it is used again.
@@ -122,10 +122,6 @@ impl OnHost {
             copy.color.recall();
             copy.depth.recall();
         }
-    }
-
-    pub fn frame(copy: usize, uniforms: FrameUniforms) -> HostFrame {
-        HostFrame { copy, uniforms }
     }
 
     /// The picture of a frame whose commands are done, linear R G B A, and the truth about it where that is wanted.
