@@ -4,7 +4,7 @@ use std::fmt;
 
 use camsim_core::scene::TexelForm;
 
-use crate::reverse::host;
+use crate::reverse::host::{self, ReverseOn};
 
 /// Errors of the GPU side. Texts name the fix.
 #[derive(Debug, thiserror::Error)]
@@ -115,8 +115,8 @@ pub struct GpuContext {
     pub(crate) pixels_a_thread: u32,
     /// How pictures are held.
     pub(crate) texels: TexelForm,
-    /// Whether the reverse pipeline of frames that it serves runs on the host ([`crate::reverse::host`]).
-    pub(crate) reverses_on_host: bool,
+    /// Where the reverse pipeline runs.
+    pub(crate) reverse_on: ReverseOn,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -158,11 +158,12 @@ fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
 
 /// Where the reverse pipeline runs: as `CAMSIM_REVERSE` says, or else on the host if the device is the host's processor, that has the vectors for it, and no other shaders are to be
 /// tried.
-fn reverses_on_host(is_software: bool) -> Result<bool, GpuError> {
+fn reverse_on(is_software: bool) -> Result<ReverseOn, GpuError> {
     match std::env::var_os("CAMSIM_REVERSE") {
-        None => Ok(is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
-        Some(place) if place == "device" => Ok(false),
-        Some(place) if place == "host" => Ok(true),
+        None if is_software && host::suits_processor() && std::env::var_os("CAMSIM_SHADER_DIR").is_none() => Ok(ReverseOn::Best),
+        None => Ok(ReverseOn::Device),
+        Some(place) if place == "device" => Ok(ReverseOn::Device),
+        Some(place) if place == "host" => Ok(ReverseOn::Host),
         Some(place) => {
             Err(GpuError::Setting { name: "CAMSIM_REVERSE", value: place.to_string_lossy().into(), allowed: "`device` or `host`" })
         }
@@ -197,21 +198,21 @@ impl GpuContext {
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
-        let reverses_on_host = reverses_on_host(is_software)?;
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverses_on_host })
+        let reverse_on = reverse_on(is_software)?;
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverse_on })
     }
 
     /// What renders, for people: the adapter, and that the host has a part in it where it has.
     #[must_use]
     pub fn describe(&self) -> String {
-        let host = if self.reverses_on_host { ", reverse pipeline on the host" } else { "" };
+        let host = if self.reverses_on_host() { ", reverse pipeline on the host" } else { "" };
         format!("{}{host}", self.adapter)
     }
 
     /// Whether the host makes output frames from ideal frames where it can.
     #[must_use]
     pub fn reverses_on_host(&self) -> bool {
-        self.reverses_on_host
+        self.reverse_on != ReverseOn::Device
     }
 
     /// Largest side of a texture.

@@ -12,7 +12,8 @@ use crate::{
     layout::Truth,
     recorder::{PassClock, Recorder},
     reverse::{
-        EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms, host,
+        EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms,
+        host::ReverseOn,
         lens_inverse::{LensInversePass, LensMap},
     },
     shaders::ComposeError,
@@ -104,10 +105,9 @@ impl Engine {
         self.gpu.pixels_a_thread = pixels.clamp(1, 4096);
     }
 
-    /// Whether the host makes output frames from ideal frames, where it can ([`crate::reverse::host`]), for sessions to come: the default on a software adapter.
-    /// Pictures differ by rounding.
-    pub fn set_reverse_on_host(&mut self, on_host: bool) {
-        self.gpu.reverses_on_host = on_host;
+    /// Where output frames are made from ideal frames, for sessions to come. Pictures differ by rounding.
+    pub fn set_reverse_on(&mut self, place: ReverseOn) {
+        self.gpu.reverse_on = place;
     }
 
     /// Most pixels of an output frame with depth and coordinates.
@@ -142,7 +142,7 @@ impl Engine {
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             drawn: None,
-            on_host: gpu.reverses_on_host.then(|| OnHost::new(gpu, &sequence)),
+            on_host: gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence)),
             slots,
             lists: None,
             buffers,
@@ -343,7 +343,7 @@ impl Session<'_> {
 
     /// What the host makes the output frame from, where it makes frames like this.
     fn bring_to_host(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan) -> Option<HostFrame> {
-        let on_host = self.on_host.as_mut().filter(|_| host::serves(plan))?;
+        let on_host = self.on_host.as_mut().filter(|_| self.engine.gpu.reverse_on.is_host(plan))?;
         let drawn = self.drawn.as_mut()?;
         let gpu = &self.engine.gpu;
         on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));

@@ -16,7 +16,10 @@ use camsim_core::{
 use camsim_gpu::{
     Engine,
     engine::Finished,
-    reverse::{PipelineKey, TapKind, TemporalKind, host},
+    reverse::{
+        PipelineKey, TapKind, TemporalKind,
+        host::{self, ReverseOn},
+    },
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
 use common::{city, engine, pattern, scenario, sequence, steady};
@@ -58,9 +61,9 @@ fn flying() -> Trajectory {
 
 /// One that makes pictures on the host, one that makes them on the device.
 fn engines() -> [Engine; 2] {
-    [true, false].map(|on_host| {
+    [ReverseOn::Host, ReverseOn::Device].map(|place| {
         let mut engine = engine();
-        engine.set_reverse_on_host(on_host);
+        engine.set_reverse_on(place);
         engine
     })
 }

@@ -9,7 +9,7 @@ use camsim_core::{
     scenario::{Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec},
     sequence::Sequence,
 };
-use camsim_gpu::reverse::PipelineKey;
+use camsim_gpu::reverse::{PipelineKey, host::ReverseOn};
 use common::{city, engine, scenario, sequence, steady};
 use glam::DVec3;
 
@@ -32,7 +32,7 @@ fn frame(sequence: &Arc<Sequence>, channels: &[Channel], pixels_a_thread: u32) -
     let mut engine = engine();
     engine.set_pixels_a_thread(pixels_a_thread);
     // The host takes blocks of its own size.
-    engine.set_reverse_on_host(false);
+    engine.set_reverse_on(ReverseOn::Device);
     let mut session = engine.session::<Infallible>(sequence.clone(), channels).expect("session");
     let mut found = None;
     let mut keep = |finished: camsim_gpu::engine::Finished| {

@@ -7,7 +7,7 @@ use camsim_core::{
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
-use camsim_gpu::reverse::host;
+use camsim_gpu::reverse::host::ReverseOn;
 use camsim_io::{load::Loaded, terrain::TerrainSummary};
 use serde::Serialize;
 
@@ -158,7 +158,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
-    if host::serves(&plan) {
+    if ReverseOn::Best.is_host(&plan) {
         console.line(format_args!("on a software adapter the host runs the reverse pipeline of this frame (`camsim info --help`)"))?;
     }
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {

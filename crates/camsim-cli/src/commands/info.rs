@@ -11,7 +11,7 @@ use crate::{console::Console, failure::Failure};
 /// Show graphics adapters, driver and limits, and which one is used
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host makes output frames from ideal frames where it can, which takes less time; CAMSIM_REVERSE=device leaves\nthat to the adapter, CAMSIM_REVERSE=host does it beside any adapter. Pictures differ by rounding."
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host makes output frames from ideal frames where that takes less time; CAMSIM_REVERSE=device leaves them to the\nadapter, CAMSIM_REVERSE=host makes all that it can, beside any adapter. Pictures differ by rounding."
 )]
 pub struct Args {
     /// Print JSON

@@ -43,6 +43,29 @@ const MOST_COPIED: f64 = 6.0;
 /// Rows that a task takes.
 const ROWS_A_TASK: usize = 16;
 
+/// Where the reverse pipeline runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReverseOn {
+    /// On the device.
+    Device,
+    /// On the host, for frames that it [`serves`] and that are [worth the copy](is_worth_the_copy): the default on a software adapter.
+    Best,
+    /// On the host, for all frames that it serves.
+    Host,
+}
+
+impl ReverseOn {
+    /// Whether the host makes frames of this plan.
+    #[must_use]
+    pub fn is_host(self, plan: &FramePlan) -> bool {
+        match self {
+            Self::Device => false,
+            Self::Best => serves(plan) && is_worth_the_copy(plan),
+            Self::Host => serves(plan),
+        }
+    }
+}
+
 /// Whether this processor has what makes it fast here: multiplication and addition in one, and on x86-64 vectors of eight and half floats.
 #[must_use]
 pub fn suits_processor() -> bool {
@@ -52,8 +75,8 @@ pub fn suits_processor() -> bool {
     cfg!(target_arch = "aarch64")
 }
 
-/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes, by a lens that stays, lines that are rows, grids of few reads, and an ideal frame not much larger than
-/// they are. That is what frames are by default.
+/// Whether frames of this plan can be made here: of one ideal frame, without rays of its own at silhouettes, by a lens that stays, lines that are rows, and grids of few reads.
+/// That is what most frames are by default.
 #[must_use]
 pub fn serves(plan: &FramePlan) -> bool {
     let key = PipelineKey::of(plan);
@@ -66,11 +89,12 @@ pub fn serves(plan: &FramePlan) -> bool {
         TapStage::Bilinear | TapStage::Spline => true,
     };
     let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
-    is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides && is_worth_the_copy(plan)
+    is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides
 }
 
-/// Whether an ideal frame is brought here in less time than its output frames save.
-fn is_worth_the_copy(plan: &FramePlan) -> bool {
+/// Whether a frame that is [`served`](serves) takes less time here: its ideal frame is brought here in less than its output frames save.
+#[must_use]
+pub fn is_worth_the_copy(plan: &FramePlan) -> bool {
     let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
     let frames = plan.shared_by.map_or(1.0, |[first, last]| (last - first + 1) as f64);
     area(plan.ideal.size_px) <= MOST_COPIED * frames * area(plan.camera.size_px)
