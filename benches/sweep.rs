@@ -128,17 +128,7 @@ fn blur(engine: &Engine, is_measuring: bool) -> Outcome<()> {
 
 /// The full camera, and with each effect left out.
 fn effects(engine: &Engine, is_measuring: bool) -> Outcome<()> {
-    let whole = changed(&[])?;
-    let mut variants = Vec::new();
-    for (name, without) in EFFECTS.into_iter().take(if is_measuring { EFFECTS.len() } else { 1 }) {
-        variants.push(Variant::open(name, engine, without.of(&whole)?, &[Channel::Color])?);
-    }
-    variants.push(Variant::open(PRESET, engine, preset()?, &[Channel::Color])?);
-    let effort = effort(EFFORT, is_measuring);
-    measure(&mut variants, 96, effort)?;
-    println!("{}", say_rounds(&variants, effort));
-    print_against(&variants, "variant");
-    Ok(())
+    without_each(engine, &changed(&[])?, Some(preset()?), "variant", is_measuring)
 }
 
 /// The same, but sampled alike whatever the error: what stages cost, where `effects` tells what frames do.
@@ -151,14 +141,21 @@ fn alike(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         ("quality.max_error_dn", "8"),
     ];
     let whole = changed(&one_way.map(|(key, value)| (key, value.to_owned())))?;
+    without_each(engine, &whole, None, "variant, all sampled alike", is_measuring)
+}
+
+fn without_each(engine: &Engine, whole: &Arc<Sequence>, preset: Option<Arc<Sequence>>, head: &str, is_measuring: bool) -> Outcome<()> {
     let mut variants = Vec::new();
     for (name, without) in EFFECTS.into_iter().take(if is_measuring { EFFECTS.len() } else { 1 }) {
-        variants.push(Variant::open(name, engine, without.of(&whole)?, &[Channel::Color])?);
+        variants.push(Variant::open(name, engine, without.of(whole)?, &[Channel::Color])?);
+    }
+    if let Some(preset) = preset {
+        variants.push(Variant::open(PRESET, engine, preset, &[Channel::Color])?);
     }
     let effort = effort(EFFORT, is_measuring);
     measure(&mut variants, 96, effort)?;
     println!("{}", say_rounds(&variants, effort));
-    print_against(&variants, "variant, all sampled alike");
+    print_against(&variants, head);
     Ok(())
 }
 
