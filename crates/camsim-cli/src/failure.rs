@@ -136,5 +136,8 @@ mod tests {
     fn adapters_have_their_own_code() {
         assert_eq!(Failure::from(GpuError::NoAdapter(String::new())).code(), NO_ADAPTER);
         assert_eq!(Failure::from(GpuError::Device("lost".into())).code(), FAILED);
+        let setting = GpuError::Setting { name: "CAMSIM_REVERSE", value: "gpu".into(), allowed: "`device` or `host`" };
+        assert_eq!(setting.to_string(), "CAMSIM_REVERSE=gpu: set it to `device` or `host`, or not at all");
+        assert_eq!(Failure::from(setting).code(), BAD_INPUT);
     }
 }
