@@ -14,7 +14,7 @@ pub(super) type Halves = [f32; 2 * CHANNELS];
 
 /// An ideal frame in the host's memory, as the device has copied it.
 #[derive(Clone, Copy, Debug)]
-pub struct IdealOnHost<'a> {
+pub(crate) struct IdealOnHost<'a> {
     /// Linear R G B A, half floats.
     pub color: &'a [u16],
     /// Texels from one row to the next.

@@ -13,7 +13,7 @@ const INVALID_ABOVE: f32 = 0.1 * INVALID_UV;
 
 /// A lens map in the host's memory: ideal (u, v) of pixels, row by row.
 #[derive(Clone, Debug)]
-pub struct LensMapOnHost {
+pub(crate) struct LensMapOnHost {
     /// Ideal rays, or [`INVALID_UV`] twice.
     pub uv: Vec<[f32; 2]>,
 }
