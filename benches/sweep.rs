@@ -190,8 +190,9 @@ fn passes(engine: &Engine, is_measuring: bool) -> Outcome<()> {
             let times = &finished.times;
             let host = [("host: plan", times.plan_ms), ("host: record", times.record_ms), ("host: read", times.read_ms)];
             let device = times.passes.iter().map(|pass| (format!("device: {}", pass.name), pass.ms));
-            let reverse = times.reverse_ms.map(|ms| ("host: reverse", ms));
-            for (name, ms) in host.into_iter().chain(reverse).map(|(name, ms)| (name.to_owned(), ms)).chain(device) {
+            let by_host = [("host: ideal", times.ideal_ms), ("host: reverse", times.reverse_ms)];
+            let by_host = by_host.into_iter().filter_map(|(name, ms)| Some((name, ms?)));
+            for (name, ms) in host.into_iter().chain(by_host).map(|(name, ms)| (name.to_owned(), ms)).chain(device) {
                 match column.iter_mut().find(|(known, _)| *known == name) {
                     Some((_, all)) => all.push(ms),
                     None => column.push((name, vec![ms])),

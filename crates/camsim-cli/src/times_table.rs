@@ -43,8 +43,8 @@ impl TimesTable {
         ] {
             self.part(name.to_owned(), ms);
         }
-        if let Some(ms) = times.reverse_ms {
-            self.part("host: reverse".to_owned(), ms);
+        for (name, ms) in [("host: ideal", times.ideal_ms), ("host: reverse", times.reverse_ms)] {
+            ms.into_iter().for_each(|ms| self.part(name.to_owned(), ms));
         }
         self.part("host: read".to_owned(), times.read_ms);
         for pass in &times.passes {

@@ -19,7 +19,7 @@ pub mod texture;
 pub use board::{Board, BoardError, BoardPoint, ned_from_board};
 pub use crossings::{Crossings, cut_where_blended_cross};
 pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLevels};
-pub use light::Light;
+pub use light::{Light, turned_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
 pub use terrain::{

@@ -117,6 +117,8 @@ pub struct GpuContext {
     pub(crate) texels: TexelForm,
     /// Where the reverse pipeline runs.
     pub(crate) reverse_on: ReverseOn,
+    /// Whether the host draws the ideal frames that it reads.
+    pub(crate) ideal_on_host: bool,
 }
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
@@ -170,6 +172,16 @@ fn reverse_on(is_software: bool) -> Result<ReverseOn, GpuError> {
     }
 }
 
+/// Whether the host draws ideal frames itself: as `CAMSIM_IDEAL` says, or else where it has the reverse pipeline by default.
+fn ideal_on_host(reverse_on: ReverseOn) -> Result<bool, GpuError> {
+    match std::env::var_os("CAMSIM_IDEAL") {
+        None => Ok(reverse_on == ReverseOn::Best),
+        Some(place) if place == "device" => Ok(false),
+        Some(place) if place == "host" => Ok(true),
+        Some(place) => Err(GpuError::Setting { name: "CAMSIM_IDEAL", value: place.to_string_lossy().into(), allowed: "`device` or `host`" }),
+    }
+}
+
 impl GpuContext {
     /// Opens the chosen adapter.
     ///
@@ -199,7 +211,8 @@ impl GpuContext {
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
         let reverse_on = reverse_on(is_software)?;
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverse_on })
+        let ideal_on_host = ideal_on_host(reverse_on)?;
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverse_on, ideal_on_host })
     }
 
     /// What renders, for people: the adapter, and that the host has a part in it where it has.

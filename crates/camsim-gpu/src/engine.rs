@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     context::{AdapterChoice, GpuContext, GpuError},
-    ideal::{IdealPass, IdealTarget},
+    ideal::{IdealPass, IdealTarget, host::View},
     layout::Truth,
     recorder::{PassClock, Recorder},
     reverse::{
@@ -110,6 +110,12 @@ impl Engine {
         self.gpu.reverse_on = place;
     }
 
+    /// Whether the host draws the ideal frames of the output frames that it makes, for sessions to come, where it can draw the scene. Pictures differ by rounding, and where that decides which surface
+    /// a pixel shows.
+    pub fn set_ideal_on_host(&mut self, is_on_host: bool) {
+        self.gpu.ideal_on_host = is_on_host;
+    }
+
     /// Most pixels of an output frame with depth and coordinates.
     #[must_use]
     pub fn most_pixels_with_truth(&self) -> u64 {
@@ -142,7 +148,7 @@ impl Engine {
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             drawn: None,
-            on_host: gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence)),
+            on_host: gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence, &buffers)),
             slots,
             lists: None,
             buffers,
@@ -171,7 +177,10 @@ struct Drawn {
     terrain_error_px: f64,
     models: LevelTolerance,
     surface_reads: SurfaceReads,
-    target: usize,
+    /// Where the device has it, if the device has drawn it.
+    target: Option<usize>,
+    /// Whether the host has drawn it.
+    by_host: bool,
     /// The slot of its frame.
     slot: usize,
     lod: LodSelection,
@@ -179,6 +188,8 @@ struct Drawn {
     out_of_order: u32,
     /// Its copy in the host's memory.
     copy: Option<usize>,
+    /// How long the host took to draw it, until that has been told.
+    ideal_ms: Option<f64>,
 }
 
 /// One sequence on the device.
@@ -314,7 +325,9 @@ impl Session<'_> {
         self.on_host.iter_mut().for_each(OnHost::recall);
         self.engine.check()?;
         let (lod, out_of_order) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
-        let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, submit_ms, ..FrameTimes::default() };
+        let ideal_ms = self.drawn.as_mut().and_then(|drawn| drawn.ideal_ms.take());
+        let record_ms = record_ms - ideal_ms.unwrap_or_default();
+        let times = FrameTimes { plan_ms: prepared.plan_ms, record_ms, ideal_ms, submit_ms, ..FrameTimes::default() };
         let on_host = on_host.map(|frame| (frame, prepared.lines));
         Ok(InFlight { slot, plan: prepared.plan, submission, lod, out_of_order, on_host, times })
     }
@@ -347,9 +360,10 @@ impl Session<'_> {
         let drawn = self.drawn.as_mut()?;
         let gpu = &self.engine.gpu;
         on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));
-        let target = &self.targets[drawn.target].ideal;
-        let copy = *drawn.copy.get_or_insert_with(|| on_host.copy_ideal(gpu, recorder, target, &plan.ideal));
-        Some(HostFrame { copy, uniforms: frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase) })
+        let target = drawn.target.map(|target| &self.targets[target].ideal);
+        let copy = drawn.copy.or_else(|| target.map(|target| on_host.copy_ideal(gpu, recorder, target, &plan.ideal)));
+        drawn.copy = copy;
+        Some(HostFrame { copy: copy?, uniforms: frame_uniforms(plan, &self.planner.sequence().scenario, self.coords_phase) })
     }
 
     /// Pass 1, only when the lens has changed: the lens map.
@@ -383,8 +397,12 @@ impl Session<'_> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         let models = plan.model_tolerance(&self.planner.sequence().scenario.quality);
+        let by_host = self.engine.gpu.reverse_on.is_host(plan) && self.on_host.as_ref().is_some_and(OnHost::draws);
+        let by_device = reverses_on_device(plan, by_host.then_some(()));
         if self.drawn.as_ref().is_some_and(|drawn| {
-            drawn.poses == poses
+            (drawn.target.is_some() || !by_device)
+                && drawn.by_host == by_host
+                && drawn.poses == poses
                 && drawn.ideal == plan.ideal
                 && drawn.edges == plan.edges
                 && drawn.terrain_error_px == plan.terrain_error_px
@@ -393,6 +411,44 @@ impl Session<'_> {
         }) {
             return Ok(());
         }
+        let mut drawn = Drawn {
+            poses,
+            ideal: plan.ideal,
+            edges: plan.edges,
+            terrain_error_px: plan.terrain_error_px,
+            models,
+            surface_reads: plan.surface_reads,
+            target: None,
+            by_host,
+            slot,
+            lod: prepared.meshes.get(plan.keys.len() / 2).map(|mesh| mesh.lod).unwrap_or_default(),
+            out_of_order: 0,
+            copy: None,
+            ideal_ms: None,
+        };
+        if by_device {
+            let (target, out_of_order) = self.ideal_on_device(recorder, prepared, slot, &models)?;
+            (drawn.target, drawn.out_of_order) = (Some(target), out_of_order);
+        }
+        if let Some(on_host) = self.on_host.as_mut().filter(|_| by_host) {
+            let (scene, buffers, terrain) = (&self.planner.sequence().scene, &self.buffers, prepared.meshes.first());
+            let begun = Instant::now();
+            drawn.copy = Some(on_host.draw(View { plan, scene, buffers, terrain, tolerance: &models }));
+            drawn.ideal_ms = Some(ms_since(begun));
+        }
+        self.drawn = Some(drawn);
+        Ok(())
+    }
+
+    /// Draws ideal frames on the device; gives their target, and how many blended triangles are out of order.
+    fn ideal_on_device(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        prepared: &Prepared,
+        slot: usize,
+        models: &LevelTolerance,
+    ) -> Result<(usize, u32), RenderErrorBase> {
+        let plan = &prepared.plan;
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
         // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
@@ -411,7 +467,7 @@ impl Session<'_> {
         let target = self.targets.len() - 1;
         let sequence = self.planner.sequence();
         let ideal_slots = &mut self.slots[slot].ideal;
-        while ideal_slots.len() < poses.len() {
+        while ideal_slots.len() < plan.keys.len() {
             ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));
         }
         if let Some(pool) = self.buffers.tiles_mut() {
@@ -420,7 +476,7 @@ impl Session<'_> {
             tiles.dedup();
             pool.bring(gpu, &tiles)?;
         }
-        let (lod, out_of_order) = self.ideal_pass.encode(
+        let out_of_order = self.ideal_pass.encode(
             gpu,
             recorder,
             ideal_slots,
@@ -428,23 +484,10 @@ impl Session<'_> {
             &self.buffers,
             plan,
             &prepared.meshes,
-            &models,
+            models,
             &self.targets[target].ideal,
         )?;
-        self.drawn = Some(Drawn {
-            poses,
-            ideal: plan.ideal,
-            edges: plan.edges,
-            terrain_error_px: plan.terrain_error_px,
-            models,
-            surface_reads: plan.surface_reads,
-            target,
-            slot,
-            lod,
-            out_of_order,
-            copy: None,
-        });
-        Ok(())
+        Ok((target, out_of_order))
     }
 
     /// Pass 3: the output frame.
@@ -460,7 +503,7 @@ impl Session<'_> {
         }
         recorder.write(&buffers.frame, 0, bytemuck::bytes_of(&uniforms));
         recorder.write(&buffers.poses, 0, bytes);
-        let Some(target) = self.drawn.as_ref().map(|drawn| &mut self.targets[drawn.target]) else { return Ok(()) };
+        let Some(target) = self.drawn.as_ref().and_then(|drawn| drawn.target).map(|target| &mut self.targets[target]) else { return Ok(()) };
         let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| &map.view) } else { None };
         let lists = (plan.edges != EdgeStage::None).then(|| {
             let lists = self

@@ -6,7 +6,7 @@ use camsim_core::{
     plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
     scenario::Preset,
-    scene::{LevelTolerance, LodSelection, PlacedMesh, Scene},
+    scene::{LevelTolerance, PlacedMesh, Scene},
     temporal::IdealGeometry,
 };
 use glam::{DMat3, DVec3};
@@ -22,6 +22,7 @@ use crate::{
 
 mod drawing;
 mod fine;
+pub(crate) mod host;
 mod layers;
 mod marks;
 mod near_marks;
@@ -240,8 +241,7 @@ impl IdealPass {
         IdealSlot { camera, terrain, placements, camera_group, placement_group, mesh_groups, drawn: Vec::new(), layers }
     }
 
-    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns the level
-    /// of detail that the terrain got in the middle one.
+    /// Records the ideal frames of a plan, each with its own slot and, where there is a terrain, its own triangles of it; returns how many blended triangles are out of order.
     ///
     /// # Errors
     /// Faults of the shader files; [`GpuError::TooLarge`] for triangles that no buffer holds.
@@ -256,7 +256,7 @@ impl IdealPass {
         meshes: &[PlacedMesh],
         tolerance: &LevelTolerance,
         target: &IdealTarget,
-    ) -> Result<(LodSelection, u32), RenderErrorBase> {
+    ) -> Result<u32, RenderErrorBase> {
         let plain = SurfaceKey::Plain(plan.surface_reads);
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
@@ -269,27 +269,21 @@ impl IdealPass {
             let near_marks = NearMarksPass::new(gpu, &self.camera_layout, &self.terrain_layout)?;
             self.silhouettes = Some(SilhouettePasses { marks: MarksPass::new(gpu)?, near_marks });
         }
-        let mut middle_lod = LodSelection::default();
         let mut out_of_order = 0;
         let mut index_counts = Vec::new();
         for (k, (key, slot)) in plan.keys.iter().zip(slots.iter_mut()).enumerate() {
             let base_ned_m = base_ned_m(&key.pose);
             recorder.write(&slot.camera, 0, bytemuck::bytes_of(&ideal_camera(plan, &key.pose, base_ned_m, scene)));
-            let mut lod = LodSelection::default();
             let mut indices = 0;
             if let (Some(terrain), Some(on_device), Some(mesh)) = (&mut slot.terrain, &buffers.terrain, meshes.get(k)) {
                 indices = place_terrain(gpu, recorder, terrain, mesh)?;
                 terrain.bind(gpu, recorder, &self.terrain_layout, on_device, &buffers.sampler);
-                lod = mesh.lod;
             }
             index_counts.push(indices);
             let seen = place_meshes(recorder, slot, buffers, &key.pose, tolerance, base_ned_m);
             if let Some(layers) = &mut slot.layers {
                 layers.order(gpu, recorder, buffers, &slot.drawn, &seen, &key.pose, tolerance.tangents)?;
                 out_of_order += layers.out_of_order;
-            }
-            if k == plan.keys.len() / 2 {
-                middle_lod = lod;
             }
         }
         let mut pass =
@@ -317,7 +311,7 @@ impl IdealPass {
             marks.stamp(gpu, recorder, target, fine);
             marks.borders(gpu, recorder, plan, target, fine);
         }
-        Ok((middle_lod, out_of_order))
+        Ok(out_of_order)
     }
 
     /// Draws each key's surfaces, one key below the other.

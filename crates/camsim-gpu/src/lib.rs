@@ -8,6 +8,8 @@
 
 pub mod context;
 
+mod host;
+
 pub mod shaders;
 
 pub mod layout;

@@ -3,7 +3,7 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::scene::{
-    Aabb, Encoding, Light, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole, levels::level_stretch,
+    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole, levels::level_stretch,
 };
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;
@@ -56,8 +56,12 @@ pub struct MeshBatch {
     pub ranges: Vec<Range<u32>>,
     /// How far each level is from the full shape.
     pub levels: Arc<ShapeLevels>,
-    /// The shape, for the order of what is mixed.
+    /// The shape.
     pub shape: Arc<Shape>,
+    /// What is on it, and the light that falls on that.
+    pub look: Material,
+    /// As above; none where it has no normals.
+    pub light: Option<Light>,
     /// Picture.
     pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
@@ -232,6 +236,8 @@ fn upload_batch(
         ranges,
         levels,
         shape: shape.clone(),
+        look: mesh.material.clone(),
+        light,
         texture,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),

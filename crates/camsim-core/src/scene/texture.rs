@@ -209,6 +209,18 @@ impl Texture {
         Cow::Owned(halves)
     }
 
+    /// Linear R G B A of a pixel, not premultiplied.
+    ///
+    /// # Panics
+    /// For a pixel that there is not.
+    #[must_use]
+    pub fn linear_at(&self, [x, y]: [u32; 2]) -> [f32; 4] {
+        let at = 4 * (y as usize * self.size_px[0] as usize + x as usize);
+        let pixel = &self.rgba8[at..at + 4];
+        let light = self.encoding.decode_table();
+        [light[usize::from(pixel[0])], light[usize::from(pixel[1])], light[usize::from(pixel[2])], f32::from(pixel[3]) / 255.0]
+    }
+
     /// Gives pixels of alpha 0 the colour of the nearest coarser level that has content, so that bilinear sampling across the border of
     /// the content does not pull in black. Alpha stays as it is. Does nothing to an opaque (or an empty) picture.
     pub fn bleed_into_transparent(&mut self) {

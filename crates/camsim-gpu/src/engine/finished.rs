@@ -21,6 +21,8 @@ pub struct FrameTimes {
     pub record_ms: f64,
     /// The driver took it. Some (Mesa's software adapters) return only when they are done with the frame before.
     pub submit_ms: f64,
+    /// The host drew the ideal frame, where it does that itself ([`crate::reverse::host`]); none where an earlier frame's is kept.
+    pub ideal_ms: Option<f64>,
     /// The host waited for the device.
     pub wait_ms: f64,
     /// The host made the picture from the ideal frame, where it does that itself ([`crate::reverse::host`]).

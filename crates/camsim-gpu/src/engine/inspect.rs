@@ -19,7 +19,11 @@ impl Session<'_> {
     /// Device faults; `None` before the first frame.
     pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
-        let target = &self.targets[drawn.target].ideal;
+        let near_m = camsim_core::plan::NEAR_M as f32;
+        let Some(target) = drawn.target.map(|target| &self.targets[target].ideal) else {
+            let images = self.on_host.as_ref().zip(drawn.copy).map(|(on_host, copy)| on_host.drawn(copy).images(drawn.ideal.size_px));
+            return Ok(images.map(|(color, depth)| (drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())));
+        };
         let [width, height] = drawn.ideal.size_px;
         let color: Vec<f32> = if target.color.format() == STORED_FORMAT {
             let bytes = read_texture::<[u8; 4]>(&self.engine.gpu, &target.color, width, height)?;
@@ -30,7 +34,6 @@ impl Session<'_> {
         };
         let depth = read_texture::<f32>(&self.engine.gpu, &target.depth, width, height)?;
         self.engine.check()?;
-        let near_m = camsim_core::plan::NEAR_M as f32;
         Ok(Some((drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())))
     }
 

@@ -9,13 +9,17 @@ use camsim_core::{
 use super::readback::Rows;
 use crate::{
     context::{GpuContext, GpuError},
-    ideal::IdealTarget,
+    ideal::{
+        IdealTarget,
+        host::{DrawnFrame, HostScene, View},
+    },
     layout::{FrameUniforms, Truth},
     recorder::Recorder,
     reverse::{
         host::{HostInputs, HostKernel, IdealOnHost, LensMapOnHost},
         lens_inverse::LensMap,
     },
+    upload::SceneBuffers,
 };
 
 /// Copies of ideal frames: one for a frame at work, one for the frame in flight after it.
@@ -37,12 +41,17 @@ pub(super) struct HostFrame {
 struct Copy {
     color: Rows,
     depth: Rows,
+    /// In place of these, one that the host has drawn itself.
+    drawn: DrawnFrame,
+    is_drawn: bool,
 }
 
 /// What stays from frame to frame.
 #[derive(Debug)]
 pub(super) struct OnHost {
     kernel: HostKernel,
+    /// What draws ideal frames, where the host does that.
+    scene: Option<HostScene>,
     vignette: Vec<f32>,
     map: Option<LensMapOnHost>,
     /// The lens map on its way.
@@ -60,14 +69,20 @@ struct Recorded {
 }
 
 impl OnHost {
-    pub fn new(gpu: &GpuContext, sequence: &Sequence) -> Self {
+    pub fn new(gpu: &GpuContext, sequence: &Sequence, buffers: &SceneBuffers) -> Self {
         Self {
             kernel: HostKernel::new(),
+            scene: gpu.ideal_on_host.then(|| HostScene::new(&sequence.scene, buffers)).flatten(),
             vignette: super::renew::vignette_weights_of(sequence).1,
             map: None,
             map_copy: None,
             copies: [(); COPIES]
-                .map(|()| Copy { color: Rows::empty(gpu, "camsim.ideal_color"), depth: Rows::empty(gpu, "camsim.ideal_depth") }),
+                .map(|()| Copy {
+                    color: Rows::empty(gpu, "camsim.ideal_color"),
+                    depth: Rows::empty(gpu, "camsim.ideal_depth"),
+                    drawn: DrawnFrame::default(),
+                    is_drawn: false,
+                }),
             last: 0,
             recorded: Recorded::default(),
         }
@@ -94,11 +109,32 @@ impl OnHost {
         self.recorded.map = Some(rows);
     }
 
+    /// Whether it draws ideal frames itself.
+    pub fn draws(&self) -> bool {
+        self.scene.is_some()
+    }
+
+    /// Draws an ideal frame; which copy it is.
+    pub fn draw(&mut self, view: View<'_>) -> usize {
+        // The frame in flight may still read the other one.
+        self.last = (self.last + 1) % COPIES;
+        let copy = &mut self.copies[self.last];
+        copy.is_drawn = true;
+        self.scene.iter_mut().for_each(|scene| scene.draw(view, &mut copy.drawn));
+        self.last
+    }
+
+    /// An ideal frame that it has drawn.
+    pub fn drawn(&self, copy: usize) -> &DrawnFrame {
+        &self.copies[copy].drawn
+    }
+
     /// Records an ideal frame's way to the host; which copy it is.
     pub fn copy_ideal(&mut self, gpu: &GpuContext, recorder: &mut Recorder<'_>, target: &IdealTarget, ideal: &IdealGeometry) -> usize {
         // The frame in flight may still read the other one.
         self.last = (self.last + 1) % COPIES;
         let copy = &mut self.copies[self.last];
+        copy.is_drawn = false;
         // Depth can only be copied whole.
         let whole = [target.depth.width(), target.depth.height()];
         for (rows, size_px, texture, texel_bytes) in
@@ -138,6 +174,11 @@ impl OnHost {
             return Err(GpuError::Device("there is no lens map on the host".into()));
         }
         let copy = &self.copies[frame.copy];
+        if copy.is_drawn {
+            let DrawnFrame { color, depth, stride } = &copy.drawn;
+            let ideal = IdealOnHost { color, color_stride: *stride as u32, depth, depth_stride: *stride as u32 };
+            return Ok(self.reverse(plan, frame, poses, ideal));
+        }
         let (color, depth) = (copy.color.view()?, copy.depth.view()?);
         let ideal = IdealOnHost {
             color: bytemuck::try_cast_slice(&color).map_err(|error| GpuError::Device(error.to_string()))?,
@@ -145,7 +186,16 @@ impl OnHost {
             depth: bytemuck::try_cast_slice(&depth).map_err(|error| GpuError::Device(error.to_string()))?,
             depth_stride: copy.depth.stride_bytes / DEPTH_BYTES as u32,
         };
-        let inputs = HostInputs { frame: &frame.uniforms, poses, map: self.map.as_ref(), vignette: &self.vignette, ideal };
-        Ok(self.kernel.render(plan, &inputs))
+        Ok(self.reverse(plan, frame, poses, ideal))
+    }
+
+    fn reverse(
+        &self,
+        plan: &FramePlan,
+        frame: &HostFrame,
+        poses: &[[[f32; 4]; 3]],
+        ideal: IdealOnHost<'_>,
+    ) -> (Vec<f32>, Option<Vec<Truth>>) {
+        self.kernel.render(plan, &HostInputs { frame: &frame.uniforms, poses, map: self.map.as_ref(), vignette: &self.vignette, ideal })
     }
 }

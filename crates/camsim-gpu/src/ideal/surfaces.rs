@@ -20,6 +20,17 @@ use crate::{
 /// Room for a few thousand triangles, bytes.
 const MIN_BYTES: u64 = 1 << 16;
 
+/// Meshes that may be in view from a key, by their places in [`SceneBuffers::placed`], those of one batch and level of detail side by side; and which of them each batch draws with
+/// each of its levels.
+pub(super) fn see_meshes(buffers: &SceneBuffers, pose: &CameraPose, tolerance: &LevelTolerance) -> (Vec<u32>, Vec<Vec<Range<u32>>>) {
+    let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
+    let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
+    let places: Vec<_> = buffers.batches.iter().map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end)).collect();
+    let batches = buffers.batches.iter().zip(places);
+    let drawn = batches.map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance)).collect();
+    (seen, drawn)
+}
+
 /// Writes where the meshes stand that may be in view from a key, which of each batch they are and with how much detail; gives whose place each is.
 pub(super) fn place_meshes(
     recorder: &mut Recorder<'_>,
@@ -29,15 +40,8 @@ pub(super) fn place_meshes(
     tolerance: &LevelTolerance,
     base_ned_m: DVec3,
 ) -> Vec<u32> {
-    let mut seen = in_view(&buffers.bounds, pose, tolerance.tangents);
-    let place = |seen: &[u32], member: u32| seen.partition_point(|&i| i < member);
-    let places: Vec<_> = buffers.batches.iter().map(|batch| place(&seen, batch.members.start)..place(&seen, batch.members.end)).collect();
-    slot.drawn = buffers
-        .batches
-        .iter()
-        .zip(places)
-        .map(|(batch, of)| by_level(batch, buffers, &mut seen[of.clone()], of.start, pose, tolerance))
-        .collect();
+    let (seen, drawn) = see_meshes(buffers, pose, tolerance);
+    slot.drawn = drawn;
     let placement = |&i: &u32| {
         let shape = &buffers.placed[i as usize];
         let origin = (shape.origin_ned_m - base_ned_m).as_vec3();

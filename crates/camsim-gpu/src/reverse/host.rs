@@ -22,21 +22,21 @@ use crate::{
 mod footprint;
 mod gather;
 mod ideal;
-mod lanes;
+
 mod photometric;
 mod rays;
 mod source;
 mod truth;
-mod vectors;
+
 
 use footprint::{Cells, Footprint, MOST_TAPS};
 pub(crate) use ideal::IdealOnHost;
-use lanes::{LANES, each};
+use crate::host::lanes::{LANES, each};
 pub(crate) use rays::LensMapOnHost;
 use source::Pose;
 #[cfg(target_arch = "x86_64")]
-use vectors::Avx2;
-use vectors::{Any, Vectors};
+use crate::host::vectors::Avx2;
+use crate::host::vectors::{Vectors, widest};
 
 /// Pixels of an ideal frame for each pixel that is made from it, at most: with 13 frames come in less time than from the device with and without an exposure, with 29 without one not any more
 /// (docs/PERFORMANCE.md, "The reverse pipeline on the host").
@@ -196,14 +196,7 @@ impl Default for HostKernel {
 impl Reads<'_> {
     /// Rows from `first` on, by the widest vectors that the processor has.
     fn rows(&self, first: u32, rows: &mut [f32], truth: &mut [Truth]) {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = Avx2::find() {
-            return avx2.run(
-                #[inline(always)]
-                |avx2| self.rows_by(avx2, first, rows, truth),
-            );
-        }
-        self.rows_by(Any, first, rows, truth);
+        widest!(vectors => self.rows_by(vectors, first, rows, truth))
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use camsim_core::temporal::tap_shares;
 
-use super::lanes::{LANES, Lanes, Lanes2, ZERO, each, within};
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, within};
 use crate::reverse::TapKind;
 
 /// Reads along a side at most: of each grid up to that the order of reads is written down.

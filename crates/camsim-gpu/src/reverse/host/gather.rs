@@ -6,10 +6,10 @@ use super::{
     Reads,
     footprint::{Footprint, Spline},
     ideal::Halves,
-    lanes::{LANES, Lanes, Lanes2, ZERO, each},
     source::{Nodes, Pose, Source},
-    vectors::Vectors,
 };
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each};
+use crate::host::vectors::Vectors;
 
 /// What pixels collect.
 pub(super) struct Gathered {

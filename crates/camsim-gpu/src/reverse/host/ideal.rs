@@ -1,9 +1,7 @@
 //! Reads of the ideal frame.
 
-use super::{
-    lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within},
-    vectors::Vectors,
-};
+use crate::host::lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within};
+use crate::host::vectors::Vectors;
 use crate::layout::FrameUniforms;
 
 /// Half floats of a texel.

@@ -2,7 +2,7 @@
 
 use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
 
-use super::lanes::{LANES, Lanes, ZERO, each};
+use crate::host::lanes::{LANES, Lanes, ZERO, each};
 use crate::layout::FrameUniforms;
 
 /// Weights of the luminance.

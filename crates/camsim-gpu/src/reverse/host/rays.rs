@@ -2,10 +2,8 @@
 
 use camsim_core::camera::INVALID_UV;
 
-use super::{
-    footprint::scaled,
-    lanes::{LANES, Lanes, Lanes2, ZERO, each},
-};
+use super::footprint::scaled;
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each};
 use crate::layout::FrameUniforms;
 
 /// Above this a lens map says "no pre-image".

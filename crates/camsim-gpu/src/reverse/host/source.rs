@@ -1,9 +1,7 @@
 //! Where rays look in the ideal frame: twins of shaders/reverse/temporal_inverse and shaders/reverse/gather/nodes.
 
-use super::{
-    Reads,
-    lanes::{LANES, Lanes, Lanes2, Lanes3, ZERO, each, whether},
-};
+use super::Reads;
+use crate::host::lanes::{LANES, Lanes, Lanes2, Lanes3, ZERO, each, whether};
 use crate::reverse::TemporalKind;
 use camsim_core::plan::NodeDepths;
 

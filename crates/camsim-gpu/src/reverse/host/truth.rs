@@ -2,9 +2,9 @@
 
 use super::{
     Reads,
-    lanes::{LANES, Lanes, Lanes2, Lanes3, each, higher},
     source::{Pose, rotate, translation},
 };
+use crate::host::lanes::{LANES, Lanes, Lanes2, Lanes3, each, higher};
 use crate::{layout::Truth, reverse::TemporalKind};
 
 /// A place of an ideal frame in the mid-window camera: its ray, and the inverse depth times the same factor.

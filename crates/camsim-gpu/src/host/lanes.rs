@@ -1,17 +1,17 @@
 //! Pixels side by side: plain loops of fixed length, which compilers turn into vector instructions.
 
 /// Pixels of a line that are worked out together: enough for wide vectors and few enough for the first cache.
-pub(super) const LANES: usize = 32;
+pub(crate) const LANES: usize = 32;
 
 /// A number of each.
-pub(super) type Lanes = [f32; LANES];
+pub(crate) type Lanes = [f32; LANES];
 
 /// Zero of each.
-pub(super) const ZERO: Lanes = [0.0; LANES];
+pub(crate) const ZERO: Lanes = [0.0; LANES];
 
 /// A number of each, by its place.
 #[inline(always)]
-pub(super) fn each(number: impl Fn(usize) -> f32) -> Lanes {
+pub(crate) fn each(number: impl Fn(usize) -> f32) -> Lanes {
     let mut lanes = ZERO;
     for i in 0..LANES {
         lanes[i] = number(i);
@@ -21,13 +21,13 @@ pub(super) fn each(number: impl Fn(usize) -> f32) -> Lanes {
 
 /// Whether it holds for each, as 0 or 1.
 #[inline(always)]
-pub(super) fn whether(holds: impl Fn(usize) -> bool) -> Lanes {
+pub(crate) fn whether(holds: impl Fn(usize) -> bool) -> Lanes {
     each(|i| if holds(i) { 1.0 } else { 0.0 })
 }
 
 /// A place on a plane of each.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lanes2 {
+pub(crate) struct Lanes2 {
     pub x: Lanes,
     pub y: Lanes,
 }
@@ -48,7 +48,7 @@ impl Lanes2 {
 
 /// A direction of each.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lanes3 {
+pub(crate) struct Lanes3 {
     pub x: Lanes,
     pub y: Lanes,
     pub z: Lanes,
@@ -56,25 +56,25 @@ pub(super) struct Lanes3 {
 
 /// Into `0..=last`; NaN becomes 0. One instruction a bound, which `f32::clamp` is not.
 #[inline(always)]
-pub(super) fn within(value: f32, last: f32) -> f32 {
+pub(crate) fn within(value: f32, last: f32) -> f32 {
     lower(higher(value, 0.0), last)
 }
 
 /// A whole number in `0..2^23`, from its bits: conversions that saturate take several instructions.
 #[inline(always)]
-pub(super) fn whole(value: f32) -> u32 {
+pub(crate) fn whole(value: f32) -> u32 {
     const FIRST_WITHOUT_FRACTION: f32 = (1_u32 << 23) as f32;
     (value + FIRST_WITHOUT_FRACTION).to_bits() & 0x007f_ffff
 }
 
 /// One instruction, which `f32::min` is not.
 #[inline(always)]
-pub(super) fn lower(a: f32, b: f32) -> f32 {
+pub(crate) fn lower(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// One instruction, which `f32::max` is not.
 #[inline(always)]
-pub(super) fn higher(a: f32, b: f32) -> f32 {
+pub(crate) fn higher(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }

@@ -1,14 +1,32 @@
 //! What processors have beyond what all of them have. The only place that takes their word for it.
 
-/// How to read half floats.
-pub(super) trait Vectors: Copy + Sync {
+/// Does work by the widest vectors that the processor has, and returns what that gives.
+macro_rules! widest {
+    ($vectors:ident => $work:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = $crate::host::vectors::Avx2::find() {
+            return avx2.run(
+                #[inline(always)]
+                |$vectors| $work,
+            );
+        }
+        let $vectors = $crate::host::vectors::Any;
+        $work
+    }};
+}
+pub(crate) use widest;
+
+/// How to read and write half floats.
+pub(crate) trait Vectors: Copy + Sync {
     /// Finite half floats as floats.
     fn numbers(self, halves: [u16; 8]) -> [f32; 8];
+    /// Floats as half floats, rounded to the nearest.
+    fn halves(self, numbers: [f32; 8]) -> [u16; 8];
 }
 
 /// Any processor.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Any;
+pub(crate) struct Any;
 
 impl Vectors for Any {
     /// Moved to where a float has exponent and fraction, and set right by a factor.
@@ -22,17 +40,22 @@ impl Vectors for Any {
         }
         numbers
     }
+
+    #[inline(always)]
+    fn halves(self, numbers: [f32; 8]) -> [u16; 8] {
+        numbers.map(|number| half::f16::from_f32(number).to_bits())
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
-pub(super) use x86::Avx2;
+pub(crate) use x86::Avx2;
 
 #[cfg(target_arch = "x86_64")]
 #[expect(unsafe_code, reason = "functions for processors that have more than all have are unsafe to call")]
 mod x86 {
     use std::arch::{
         is_x86_feature_detected,
-        x86_64::{__m128i, _mm256_cvtph_ps},
+        x86_64::{__m128i, _MM_FROUND_TO_NEAREST_INT, _mm256_cvtph_ps, _mm256_cvtps_ph},
     };
 
     use super::Vectors;
@@ -63,6 +86,13 @@ mod x86 {
             let halves: __m128i = bytemuck::cast(halves);
             // SAFETY: `self` tells that this processor has it.
             bytemuck::cast(unsafe { _mm256_cvtph_ps(halves) })
+        }
+
+        #[inline(always)]
+        fn halves(self, numbers: [f32; 8]) -> [u16; 8] {
+            let numbers = bytemuck::cast(numbers);
+            // SAFETY: `self` tells that this processor has it.
+            bytemuck::cast(unsafe { _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(numbers) })
         }
     }
 }

@@ -1,0 +1,291 @@
+//! The ideal frame on the host's own processors, for software adapters.
+//!
+//! Such an adapter's driver draws triangles as a GPU would: it shades blocks of 4x4 pixels for each triangle that touches them, small triangles over and over, and one is a matter of a microsecond.
+//! Here triangles only tell which of them a pixel shows, and how far it is; then each pixel's colour is worked out once, from the planes of its own triangle, whose derivatives are exact. Corners
+//! stand on the devices' grid of 1/256 px and borders belong to triangles by the same rule, so that nothing is covered twice or not at all.
+//!
+//! Where triangles go: corners ([`corners`]) -> triangles and the bands of rows that they may be in ([`triangles`]) -> what pixels show ([`cover`]) -> colours ([`shade`], [`reads`]).
+
+use std::{collections::HashMap, ops::Range, sync::Arc};
+
+use camsim_core::{
+    plan::{FramePlan, SurfaceReads},
+    pose::CameraPose,
+    scene::{LevelTolerance, Light, PlacedMesh, Scene, Texture, Wrap},
+};
+use rayon::prelude::*;
+
+use super::{base_ned_m, ideal_camera, surfaces::see_meshes};
+use crate::{
+    host::{
+        lanes::LANES,
+        vectors::{Vectors, widest},
+    },
+    upload::{GroundPicture, MeshBatch, SceneBuffers},
+};
+
+mod corners;
+mod cover;
+mod models;
+mod picture;
+mod reads;
+mod shade;
+mod triangles;
+
+use corners::{Camera, Corner};
+use cover::{BEYOND, Band, SKY};
+use models::{Piece, TRIANGLES_A_CHUNK};
+use picture::Picture;
+use shade::{Paint, Shader};
+use triangles::{BAND_ROWS, Chunk, Kind};
+
+/// Corners of the terrain that a task projects.
+const CORNERS_A_TASK: usize = 4096;
+/// What is on the ground.
+const GROUND: u32 = 0;
+/// Half floats of a texel.
+const CHANNELS: usize = 4;
+
+/// An ideal frame in memory.
+#[derive(Debug, Default)]
+pub(crate) struct DrawnFrame {
+    /// Linear R G B A, half floats.
+    pub color: Vec<u16>,
+    /// near / z; 0 is infinitely far.
+    pub depth: Vec<f32>,
+    /// Texels from one row to the next, of both.
+    pub stride: usize,
+}
+
+impl DrawnFrame {
+    /// Linear R G B A and near / z of a frame of this size, row-major.
+    pub fn images(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
+        let (width, height) = (width as usize, height as usize);
+        let color = self.color.chunks_exact(CHANNELS * self.stride).take(height).flat_map(|row| &row[..CHANNELS * width]);
+        let depth = self.depth.chunks_exact(self.stride).take(height).flat_map(|row| &row[..width]);
+        (color.map(|&bits| half::f16::from_bits(bits).to_f32()).collect(), depth.copied().collect())
+    }
+}
+
+/// A scene that the host draws.
+#[derive(Debug)]
+pub(crate) struct HostScene {
+    /// Of the ground, then those of batches.
+    paints: Vec<Paint>,
+    /// By batch.
+    models: Vec<Model>,
+    chunks: Vec<Chunk>,
+    terrain: Vec<Corner<2>>,
+    /// Which triangle each pixel shows.
+    shown: Vec<u32>,
+}
+
+/// Meshes of one shape and material.
+#[derive(Debug)]
+struct Model {
+    /// By level of detail.
+    levels: Vec<Vec<Piece>>,
+    one_sided: bool,
+    light: Option<Light>,
+}
+
+/// Triangles of a chunk.
+#[derive(Debug)]
+enum Job {
+    /// These indices of the terrain.
+    Terrain(Range<usize>),
+    /// A piece of a batch's level, at these of the places in view.
+    Piece { batch: usize, level: usize, piece: usize, places: Range<usize> },
+}
+
+/// What an ideal frame is drawn from.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    pub plan: &'a FramePlan,
+    pub scene: &'a Scene,
+    pub buffers: &'a SceneBuffers,
+    /// Triangles of the terrain, if there is any.
+    pub terrain: Option<&'a PlacedMesh>,
+    pub tolerance: &'a LevelTolerance,
+}
+
+impl HostScene {
+    /// None for a scene with what only the device draws: pictures in tiles, mirrored beyond their borders or with sharp texels, holes, and blended surfaces.
+    pub fn new(scene: &Scene, buffers: &SceneBuffers) -> Option<Self> {
+        if buffers.batches.iter().any(|batch| batch.kind.holes || batch.kind.blends) {
+            return None;
+        }
+        let mut pictures = Pictures::default();
+        let ground = match (&scene.terrain, &buffers.terrain) {
+            (Some(_), Some(on_device)) if matches!(on_device.picture, GroundPicture::Tiles(_)) => return None,
+            (Some(terrain), _) => Arc::new(Picture::new(&terrain.texture, [Wrap::Clamp; 2], false)?),
+            (None, _) => Arc::new(Picture::Uniform([0.0; 4])),
+        };
+        let mut paints = vec![Paint { picture: ground, tint: [1.0; 3], emissive: [0.0; 3], has_more: false, sky: None }];
+        for batch in &buffers.batches {
+            paints.push(paint(batch, pictures.of(batch)?));
+        }
+        let model = |batch: &MeshBatch| Model {
+            levels: Piece::of_levels(&batch.shape, &batch.levels),
+            one_sided: batch.kind.one_sided,
+            light: batch.light,
+        };
+        let models = buffers.batches.iter().map(model).collect();
+        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Vec::new() })
+    }
+
+    /// Draws the one ideal frame of a plan.
+    pub fn draw(&mut self, view: View<'_>, into: &mut DrawnFrame) {
+        let Some(key) = view.plan.keys.first() else { return };
+        let ideal = &view.plan.ideal;
+        let camera = Camera {
+            uniforms: ideal_camera(view.plan, &key.pose, base_ned_m(&key.pose), view.scene),
+            focal_px: ideal.focal_px.as_vec2().to_array(),
+            principal_px: ideal.principal_px.as_vec2().to_array(),
+            size_px: ideal.size_px,
+        };
+        let [width, height] = camera.size_px.map(|side| side as usize);
+        into.stride = (width + BEYOND).next_multiple_of(LANES);
+        into.depth.resize(into.stride * height, 0.0);
+        into.color.resize(CHANNELS * into.stride * height, 0);
+        self.shown.resize(into.stride * height, SKY);
+        let (seen, drawn) = see_meshes(view.buffers, &key.pose, view.tolerance);
+        let mut jobs = terrain_jobs(view.terrain);
+        self.add_jobs(&drawn, &mut jobs);
+        self.project_terrain(&camera, view.terrain);
+        self.collect(&camera, &view, &key.pose, &seen, &jobs);
+        self.fill(&camera, view.plan.surface_reads, jobs.len(), into);
+    }
+
+    fn add_jobs(&self, drawn: &[Vec<Range<u32>>], jobs: &mut Vec<Job>) {
+        for (batch, (model, drawn)) in self.models.iter().zip(drawn).enumerate() {
+            for (level, (pieces, places)) in model.levels.iter().zip(drawn).enumerate() {
+                for (piece, of) in pieces.iter().enumerate() {
+                    let together = (TRIANGLES_A_CHUNK / of.len().max(1)).max(1);
+                    let places = places.start as usize..places.end as usize;
+                    let end = places.end;
+                    jobs.extend(places.step_by(together).map(|first| {
+                        let places = first..(first + together).min(end);
+                        Job::Piece { batch, level, piece, places }
+                    }));
+                }
+            }
+        }
+    }
+
+    fn project_terrain(&mut self, camera: &Camera, terrain: Option<&PlacedMesh>) {
+        let vertices = terrain.map_or(&[][..], |mesh| &mesh.vertices);
+        let project = |&[x, y, z, u, v]: &[f32; 5]| camera.corner(camera.in_camera_m([x, y, z]), [u, v]);
+        let nowhere = project(&[0.0; 5]);
+        self.terrain.resize(vertices.len(), nowhere);
+        let tasks = self.terrain.par_chunks_mut(CORNERS_A_TASK).zip(vertices.par_chunks(CORNERS_A_TASK));
+        tasks.for_each(|(corners, vertices)| {
+            widest!(_vectors => corners.iter_mut().zip(vertices).for_each(|(corner, vertex)| *corner = project(vertex)));
+        });
+    }
+
+    /// Triangles of all jobs, and which bands they are in.
+    fn collect(&mut self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], jobs: &[Job]) {
+        let bands = (camera.size_px[1] as usize).div_ceil(BAND_ROWS);
+        let mut chunks = std::mem::take(&mut self.chunks);
+        if chunks.len() < jobs.len() {
+            chunks.resize_with(jobs.len(), Chunk::default);
+        }
+        jobs.par_iter().zip(&mut *chunks).for_each(|(job, chunk)| {
+            chunk.clear();
+            self.triangles_of(camera, view, pose, seen, job, chunk);
+            chunk.sort(bands);
+        });
+        self.chunks = chunks;
+    }
+
+    fn triangles_of(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &Job, chunk: &mut Chunk) {
+        widest!(_vectors => self.triangles(camera, view, pose, seen, job, chunk))
+    }
+
+    #[inline(always)]
+    fn triangles(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &Job, chunk: &mut Chunk) {
+        match job {
+            Job::Terrain(of) => {
+                let kind = Kind { paint: GROUND, one_sided: false };
+                let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
+                for triangle in indices.chunks_exact(3) {
+                    let corner = |k: usize| &self.terrain[triangle[k] as usize];
+                    chunk.add(camera, [corner(0), corner(1), corner(2)], kind);
+                }
+            }
+            Job::Piece { batch, level, piece, places } => {
+                let model = &self.models[*batch];
+                let kind = Kind { paint: *batch as u32 + 1, one_sided: model.one_sided };
+                let piece = &model.levels[*level][*piece];
+                for &place in &seen[places.clone()] {
+                    let stands = &view.buffers.placed[place as usize];
+                    match self.paints[kind.paint as usize].has_more {
+                        true => piece.draw_more(camera, pose, stands, model.light, kind, chunk),
+                        false => piece.draw(camera, pose, stands, kind, chunk),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Depth and colour of every pixel.
+    fn fill(&mut self, camera: &Camera, reads: SurfaceReads, chunks: usize, into: &mut DrawnFrame) {
+        let stride = into.stride;
+        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads };
+        let of_band = stride * BAND_ROWS;
+        let bands = into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
+        bands.enumerate().for_each(|(band, ((depth, color), shown))| {
+            depth.fill(0.0);
+            shown.fill(SKY);
+            let band = Band { first_row: band * BAND_ROWS, stride, depth, shown };
+            widest!(vectors => fill_band(vectors, &shader, band, color))
+        });
+    }
+}
+
+#[inline(always)]
+fn fill_band(vectors: impl Vectors, shader: &Shader<'_>, mut band: Band<'_>, color: &mut [u16]) {
+    for (number, chunk) in (0..).zip(shader.chunks) {
+        band.draw(chunk, number);
+    }
+    let width = shader.camera.size_px[0] as usize;
+    let rows = band.depth.chunks_exact(band.stride).zip(band.shown.chunks_exact(band.stride)).zip(color.chunks_exact_mut(CHANNELS * band.stride));
+    for (row, ((depth, shown), color)) in rows.enumerate() {
+        let blocks = depth.as_chunks().0.iter().zip(shown.as_chunks().0).zip(color.chunks_exact_mut(CHANNELS * LANES));
+        for (number, ((depth, shown), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
+            shader.block(vectors, [number * LANES, band.first_row + row], depth, shown, color);
+        }
+    }
+}
+
+fn terrain_jobs(terrain: Option<&PlacedMesh>) -> Vec<Job> {
+    let count = terrain.map_or(0, |mesh| mesh.indices.len());
+    let step = 3 * TRIANGLES_A_CHUNK;
+    (0..count).step_by(step).map(|first| Job::Terrain(first..(first + step).min(count))).collect()
+}
+
+fn paint(batch: &MeshBatch, picture: Arc<Picture>) -> Paint {
+    let tint = |corner: usize| batch.shape.vertices.get(corner).map_or([1.0; 3], |vertex| [vertex.tint[0], vertex.tint[1], vertex.tint[2]]);
+    let first = tint(0);
+    let has_more = batch.light.is_some() || (0..batch.shape.vertices.len()).any(|corner| tint(corner) != first);
+    let sky = batch.light.map(|light| light.sky as f32);
+    Paint { picture, tint: first, emissive: batch.look.emissive, has_more, sky }
+}
+
+/// Pictures that several batches share, each once.
+#[derive(Default)]
+struct Pictures(HashMap<(*const Texture, [u8; 2]), Arc<Picture>>);
+
+impl Pictures {
+    fn of(&mut self, batch: &MeshBatch) -> Option<Arc<Picture>> {
+        let look = &batch.look;
+        let name = (Arc::as_ptr(&look.texture), look.wrap.map(|wrap| wrap as u8));
+        if let Some(known) = self.0.get(&name) {
+            return Some(known.clone());
+        }
+        let picture = Arc::new(Picture::new(&look.texture, look.wrap, look.nearest)?);
+        self.0.insert(name, picture.clone());
+        Some(picture)
+    }
+}

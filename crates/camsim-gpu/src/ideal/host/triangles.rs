@@ -1,0 +1,171 @@
+//! Triangles as they are drawn: which pixels they may cover, and what is on them as planes over the picture.
+
+use super::{
+    corners::{Camera, Corner, SUBPIXEL_BITS, SUBPIXELS},
+    cover::SMALL_PX,
+};
+
+/// Rows of the picture that are drawn together.
+pub(super) const BAND_ROWS: usize = 32;
+/// Numbers on a triangle besides texture coordinates, where it has any: a tint, and what light needs of the normal (towards the sun, down).
+pub(super) const MORE: usize = 5;
+
+/// A number over the picture: at the triangle's first pixel, and how it changes from pixel to pixel across and down.
+pub(super) type Plane = [f32; 3];
+
+/// What decides which pixels a triangle covers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cover {
+    /// First and last pixels, across and down.
+    pub first: [u16; 2],
+    pub last: [u16; 2],
+    /// Corners from the first pixel on, 1/[`SUBPIXELS`] px, clockwise as the picture is seen.
+    pub at: [[i32; 2]; 3],
+    /// near / z.
+    pub inverse: Plane,
+    /// Whether all corners are so near the first pixel that 32 bits are exact.
+    pub is_small: bool,
+}
+
+/// What is on a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    /// Of the planes.
+    pub first: [f32; 2],
+    /// Which [`super::shade::Paint`].
+    pub paint: u32,
+    /// Texture coordinates, and near / z, each times near / z.
+    pub u: Plane,
+    pub v: Plane,
+    pub inverse: Plane,
+    /// Place in [`Chunk::more`].
+    pub more: u32,
+}
+
+/// What triangles have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kind {
+    pub paint: u32,
+    pub one_sided: bool,
+}
+
+/// Triangles that are worked out together, in the order in which they are drawn.
+#[derive(Debug, Default)]
+pub(super) struct Chunk {
+    pub covers: Vec<Cover>,
+    pub surfaces: Vec<Surface>,
+    /// Planes of what some have besides.
+    pub more: Vec<[Plane; MORE]>,
+    /// Triangles by the bands that they may be in, and where each band's begin.
+    in_band: Vec<u32>,
+    band_starts: Vec<u32>,
+}
+
+impl Chunk {
+    /// Forgets its triangles, but not the memory that they took.
+    pub fn clear(&mut self) {
+        self.covers.clear();
+        self.surfaces.clear();
+        self.more.clear();
+    }
+
+    /// Those that may be in a band.
+    pub fn of_band(&self, band: usize) -> &[u32] {
+        match self.band_starts.get(band..band + 2) {
+            Some(&[begin, end]) => &self.in_band[begin as usize..end as usize],
+            _ => &[],
+        }
+    }
+
+    /// Sorts triangles into bands, those of one in their order.
+    pub fn sort(&mut self, bands: usize) {
+        let of = |cover: &Cover| usize::from(cover.first[1]) / BAND_ROWS..usize::from(cover.last[1]) / BAND_ROWS + 1;
+        self.band_starts.clear();
+        self.band_starts.resize(bands + 2, 0);
+        for cover in &self.covers {
+            of(cover).for_each(|band| self.band_starts[band + 2] += 1);
+        }
+        for band in 1..bands + 2 {
+            self.band_starts[band] += self.band_starts[band - 1];
+        }
+        self.in_band.clear();
+        self.in_band.resize(self.band_starts[bands + 1] as usize, 0);
+        for (number, cover) in self.covers.iter().enumerate() {
+            for band in of(cover) {
+                let place = &mut self.band_starts[band + 1];
+                self.in_band[*place as usize] = number as u32;
+                *place += 1;
+            }
+        }
+        self.band_starts.pop();
+    }
+
+    /// Adds a triangle, or what of it is within.
+    #[inline(always)]
+    pub fn add<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+        if corners.iter().all(|corner| corner.is_within) {
+            return self.add_within(camera, corners, kind);
+        }
+        self.add_cut(camera, corners, kind);
+    }
+
+    #[cold]
+    fn add_cut<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+        if corners.iter().all(|corner| corner.in_camera_m[2] < camera.uniforms.near_m) {
+            return;
+        }
+        let polygon = camera.cut(corners);
+        for pair in polygon.windows(2).skip(1) {
+            self.add_within(camera, [&polygon[0], &pair[0], &pair[1]], kind);
+        }
+    }
+
+    #[inline(always)]
+    fn add_within<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+        let [a, b, c] = corners;
+        let [ax, ay, bx, by, cx, cy] = [a.at[0], a.at[1], b.at[0], b.at[1], c.at[0], c.at[1]];
+        let (left, right) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
+        let (top, bottom) = (ay.min(by).min(cy), ay.max(by).max(cy));
+        // Pixels whose middles are within the box.
+        let first = [((left + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0), ((top + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0)];
+        let last = [(right >> SUBPIXEL_BITS).min(camera.size_px[0] as i32 - 1), (bottom >> SUBPIXEL_BITS).min(camera.size_px[1] as i32 - 1)];
+        if first[0] > last[0] || first[1] > last[1] {
+            return;
+        }
+        let area2 = i64::from(bx - ax) * i64::from(cy - ay) - i64::from(by - ay) * i64::from(cx - ax);
+        if area2 == 0 || (area2 > 0 && kind.one_sided) {
+            return;
+        }
+        let (is_front, b, c) = if area2 < 0 { (true, c, b) } else { (false, b, c) };
+        let from = [first[0] << SUBPIXEL_BITS, first[1] << SUBPIXEL_BITS];
+        let place = |corner: &Corner<N>| [corner.at[0] - from[0], corner.at[1] - from[1]];
+        let at = [place(a), place(b), place(c)];
+        let is_near = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
+        let is_small = is_near(at[0]) & is_near(at[1]) & is_near(at[2]);
+        const PX: f32 = 1.0 / SUBPIXELS as f32;
+        let [x, y] = [at[0][0] as f32 * PX, at[0][1] as f32 * PX];
+        let [to_bx, to_by] = [(b.at[0] - ax) as f32 * PX, (b.at[1] - ay) as f32 * PX];
+        let [to_cx, to_cy] = [(c.at[0] - ax) as f32 * PX, (c.at[1] - ay) as f32 * PX];
+        let per_area = 1.0 / (area2.abs() as f32 * (PX * PX));
+        let plane = |of_a: f32, of_b: f32, of_c: f32| -> Plane {
+            let (to_b, to_c) = (of_b - of_a, of_c - of_a);
+            let across = (to_b * to_cy - to_c * to_by) * per_area;
+            let down = (to_c * to_bx - to_b * to_cx) * per_area;
+            [of_a - across * x - down * y, across, down]
+        };
+        let times_inverse = |k: usize| plane(a.on_it[k] * a.inverse, b.on_it[k] * b.inverse, c.on_it[k] * c.inverse);
+        let inverse = plane(a.inverse, b.inverse, c.inverse);
+        let [first, last] = [[first[0] as u16, first[1] as u16], [last[0] as u16, last[1] as u16]];
+        let more = self.more.len() as u32;
+        if N == 2 + MORE {
+            let mut planes: [Plane; MORE] = std::array::from_fn(|k| times_inverse(2 + k));
+            if !is_front {
+                // The side that is seen has its normal the other way.
+                planes[MORE - 2..].iter_mut().flatten().for_each(|number| *number = -*number);
+            }
+            self.more.push(planes);
+        }
+        self.covers.push(Cover { first, last, at, inverse, is_small });
+        self.surfaces.push(Surface { first: [f32::from(first[0]), f32::from(first[1])], paint: kind.paint, u: times_inverse(0), v: times_inverse(1), inverse, more });
+    }
+}
