@@ -178,7 +178,9 @@ fn ideal_on_host(reverse_on: ReverseOn) -> Result<bool, GpuError> {
         None => Ok(reverse_on == ReverseOn::Best),
         Some(place) if place == "device" => Ok(false),
         Some(place) if place == "host" => Ok(true),
-        Some(place) => Err(GpuError::Setting { name: "CAMSIM_IDEAL", value: place.to_string_lossy().into(), allowed: "`device` or `host`" }),
+        Some(place) => {
+            Err(GpuError::Setting { name: "CAMSIM_IDEAL", value: place.to_string_lossy().into(), allowed: "`device` or `host`" })
+        }
     }
 }
 

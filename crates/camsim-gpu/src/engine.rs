@@ -503,7 +503,9 @@ impl Session<'_> {
         }
         recorder.write(&buffers.frame, 0, bytemuck::bytes_of(&uniforms));
         recorder.write(&buffers.poses, 0, bytes);
-        let Some(target) = self.drawn.as_ref().and_then(|drawn| drawn.target).map(|target| &mut self.targets[target]) else { return Ok(()) };
+        let Some(target) = self.drawn.as_ref().and_then(|drawn| drawn.target).map(|target| &mut self.targets[target]) else {
+            return Ok(());
+        };
         let lens_map = if plan.ray == RayStage::LensMap { self.lens_map.as_ref().map(|(_, map)| &map.view) } else { None };
         let lists = (plan.edges != EdgeStage::None).then(|| {
             let lists = self

@@ -3,7 +3,8 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::scene::{
-    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole, levels::level_stretch,
+    Aabb, Encoding, Light, Material, Mesh, Scene, SceneLevels, Shape, ShapeLevels, Terrain, TexelForm, Texture, Wrap, is_whole,
+    levels::level_stretch,
 };
 use glam::{DMat3, DVec3};
 use wgpu::util::DeviceExt;

@@ -64,6 +64,8 @@ fn engines() -> [Engine; 2] {
     [ReverseOn::Host, ReverseOn::Device].map(|place| {
         let mut engine = engine();
         engine.set_reverse_on(place);
+        // Both from the same ideal frames.
+        engine.set_ideal_on_host(false);
         engine
     })
 }

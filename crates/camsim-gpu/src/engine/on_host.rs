@@ -76,13 +76,12 @@ impl OnHost {
             vignette: super::renew::vignette_weights_of(sequence).1,
             map: None,
             map_copy: None,
-            copies: [(); COPIES]
-                .map(|()| Copy {
-                    color: Rows::empty(gpu, "camsim.ideal_color"),
-                    depth: Rows::empty(gpu, "camsim.ideal_depth"),
-                    drawn: DrawnFrame::default(),
-                    is_drawn: false,
-                }),
+            copies: [(); COPIES].map(|()| Copy {
+                color: Rows::empty(gpu, "camsim.ideal_color"),
+                depth: Rows::empty(gpu, "camsim.ideal_depth"),
+                drawn: DrawnFrame::default(),
+                is_drawn: false,
+            }),
             last: 0,
             recorded: Recorded::default(),
         }

@@ -234,7 +234,8 @@ impl HostScene {
         let stride = into.stride;
         let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads };
         let of_band = stride * BAND_ROWS;
-        let bands = into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
+        let bands =
+            into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
         bands.enumerate().for_each(|(band, ((depth, color), shown))| {
             depth.fill(0.0);
             shown.fill(SKY);
@@ -250,7 +251,8 @@ fn fill_band(vectors: impl Vectors, shader: &Shader<'_>, mut band: Band<'_>, col
         band.draw(chunk, number);
     }
     let width = shader.camera.size_px[0] as usize;
-    let rows = band.depth.chunks_exact(band.stride).zip(band.shown.chunks_exact(band.stride)).zip(color.chunks_exact_mut(CHANNELS * band.stride));
+    let rows =
+        band.depth.chunks_exact(band.stride).zip(band.shown.chunks_exact(band.stride)).zip(color.chunks_exact_mut(CHANNELS * band.stride));
     for (row, ((depth, shown), color)) in rows.enumerate() {
         let blocks = depth.as_chunks().0.iter().zip(shown.as_chunks().0).zip(color.chunks_exact_mut(CHANNELS * LANES));
         for (number, ((depth, shown), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {

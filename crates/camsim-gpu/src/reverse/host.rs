@@ -28,15 +28,14 @@ mod rays;
 mod source;
 mod truth;
 
-
-use footprint::{Cells, Footprint, MOST_TAPS};
-pub(crate) use ideal::IdealOnHost;
 use crate::host::lanes::{LANES, each};
-pub(crate) use rays::LensMapOnHost;
-use source::Pose;
 #[cfg(target_arch = "x86_64")]
 use crate::host::vectors::Avx2;
 use crate::host::vectors::{Vectors, widest};
+use footprint::{Cells, Footprint, MOST_TAPS};
+pub(crate) use ideal::IdealOnHost;
+pub(crate) use rays::LensMapOnHost;
+use source::Pose;
 
 /// Pixels of an ideal frame for each pixel that is made from it, at most: with 13 frames come in less time than from the device with and without an exposure, with 29 without one not any more
 /// (docs/PERFORMANCE.md, "The reverse pipeline on the host").

@@ -23,7 +23,8 @@ pub(super) struct Corner<const N: usize> {
     pub in_camera_m: [f32; 3],
     /// What is on it: texture coordinates first.
     pub on_it: [f32; N],
-    /// In the picture, 1/[`SUBPIXELS`] px.
+    /// In the picture, pixels; and on the grid of 1/[`SUBPIXELS`] px.
+    pub at_px: [f32; 2],
     pub at: [i32; 2],
     /// near / z.
     pub inverse: f32,
@@ -42,7 +43,14 @@ impl Camera {
         let is_within = z >= self.uniforms.near_m && x_px.abs() <= FARTHEST_PX && y_px.abs() <= FARTHEST_PX;
         let on_grid = |px: f32| (if is_within { px * SUBPIXELS as f32 } else { 0.0 }).round_ties_even() as i32;
         let at = [on_grid(x_px), on_grid(y_px)];
-        Corner { in_camera_m, on_it, at, inverse: self.uniforms.near_m * inverse_z, is_within }
+        Corner { in_camera_m, on_it, at_px: [x_px, y_px], at, inverse: self.uniforms.near_m * inverse_z, is_within }
+    }
+
+    /// Where a corner is in the picture, pixels, with all digits: far beside it few are left of [`Corner::at_px`].
+    pub fn place_px<const N: usize>(&self, corner: &Corner<N>) -> [f64; 2] {
+        let [x, y, z] = corner.in_camera_m.map(f64::from);
+        let along = |side: f64, k: usize| side / z * f64::from(self.focal_px[k]) + f64::from(self.principal_px[k]);
+        [along(x, 0), along(y, 1)]
     }
 
     /// From metres relative to the base, as `in_ideal_camera` of shaders/ideal/camera.wgsl.

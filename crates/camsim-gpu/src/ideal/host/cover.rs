@@ -52,7 +52,10 @@ impl Band<'_> {
         for &triangle in chunk.of_band(self.first_row / BAND_ROWS) {
             let cover = &chunk.covers[triangle as usize];
             let name = number << CHUNK_BITS | triangle;
-            if cover.is_small { self.small(cover, name) } else { self.large(cover, name) }
+            match chunk.large.get(cover.large as usize) {
+                None => self.small(cover, name),
+                Some([inverse, ..]) => self.large(cover, inverse, name),
+            }
         }
     }
 
@@ -98,7 +101,7 @@ impl Band<'_> {
     }
 
     /// By spans, whose ends are exact in 64 bits.
-    fn large(&mut self, cover: &Cover, name: u32) {
+    fn large(&mut self, cover: &Cover, inverse: &[f64; 3], name: u32) {
         let [a, b, c] = cover.at;
         let sides: [Side<i64>; 3] = [side(a, b), side(b, c), side(c, a)];
         for y in self.rows(cover) {
@@ -116,12 +119,12 @@ impl Band<'_> {
             if first > last {
                 continue;
             }
-            let inverse = cover.inverse[0] + cover.inverse[2] * down as f32;
+            let begin = inverse[0] + inverse[2] * down as f64 + inverse[1] * first as f64;
             let row = (y - self.first_row) * self.stride + usize::from(cover.first[0]);
             let span = row + first as usize..row + last as usize + 1;
             let pixels = self.depth[span.clone()].iter_mut().zip(&mut self.shown[span]);
-            for (i, (depth, shown)) in pixels.enumerate() {
-                let here = cover.inverse[1].mul_add((first as i32 + i as i32) as f32, inverse);
+            for (i, (depth, shown)) in (0_i32..).zip(pixels) {
+                let here = (begin + inverse[1] * f64::from(i)) as f32;
                 let is_seen = here > *depth;
                 *depth = if is_seen { here } else { *depth };
                 *shown = if is_seen { name } else { *shown };

@@ -93,7 +93,16 @@ impl Texels {
 
     /// Adds reads of the pixels that are asked for, times a weight of each: bilinear, between the two versions that a level lies between.
     #[inline(always)]
-    pub fn add_reads(&self, vectors: impl Vectors, u: &Lanes, v: &Lanes, level: &Lanes, weight: &Lanes, is_asked: &[bool; LANES], sums: &mut Sums) {
+    pub fn add_reads(
+        &self,
+        vectors: impl Vectors,
+        u: &Lanes,
+        v: &Lanes,
+        level: &Lanes,
+        weight: &Lanes,
+        is_asked: &[bool; LANES],
+        sums: &mut Sums,
+    ) {
         let below = each(|i| within(level[i], self.last).floor());
         let share = each(|i| within(level[i], self.last) - below[i]);
         let is_between = share.iter().any(|&share| share > 0.0);

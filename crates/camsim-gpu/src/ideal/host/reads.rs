@@ -159,9 +159,8 @@ fn version_variance(level: f32) -> f32 {
 #[inline(always)]
 fn add_grid(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &Pixels, is_asked: &[bool; LANES], sums: &mut Sums) {
     let (mut level, mut taps, mut lengths) = (ZERO, [ZERO; 2], [ZERO; 2]);
-    let tap_length = |side: f32, taps: f32, version: f32| {
-        (higher(side * side - version, 0.0) / higher(1.0 - 1.0 / (taps * taps), 0.5)).sqrt()
-    };
+    let tap_length =
+        |side: f32, taps: f32, version: f32| (higher(side * side - version, 0.0) / higher(1.0 - 1.0 / (taps * taps), 0.5)).sqrt();
     for i in (0..LANES).filter(|&i| is_asked[i]) {
         let (longer, shorter) = (pixels.longer[i], pixels.shorter[i]);
         let short_taps = if shorter > ONE_TAP { SHORT_TAPS } else { 1.0 };

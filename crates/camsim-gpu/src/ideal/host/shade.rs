@@ -9,7 +9,7 @@ use super::{
     cover::{CHUNK_BITS, SKY},
     picture::Picture,
     reads::{Colors, Places, colors, let_through},
-    triangles::{Chunk, MORE, Plane, Surface},
+    triangles::{Chunk, MORE, Plane, SMALL, Surface},
 };
 use crate::host::{
     lanes::{LANES, Lanes, ZERO, each, higher, lower},
@@ -37,7 +37,7 @@ pub(super) struct Shader<'a> {
     pub reads: SurfaceReads,
 }
 
-const NO_SURFACE: Surface = Surface { first: [0.0; 2], paint: SKY, u: [0.0; 3], v: [0.0; 3], inverse: [0.0; 3], more: 0 };
+const NO_SURFACE: Surface = Surface { first: [0.0; 2], paint: SKY, u: [0.0; 3], v: [0.0; 3], inverse: [0.0; 3], more: 0, large: SMALL };
 
 /// What surfaces have at pixels.
 struct Seen {
@@ -93,6 +93,12 @@ impl Shader<'_> {
             paint[i] = surface.paint;
             let px = [(x + i) as f32 - surface.first[0], y as f32 - surface.first[1]];
             (u[i], v[i]) = (at(surface.u, px), at(surface.v, px));
+            if surface.large != SMALL {
+                let [inverse, of_u, of_v] = self.chunks[(shown[i] >> CHUNK_BITS) as usize].large[surface.large as usize];
+                let at = |plane: [f64; 3]| plane[0] + plane[1] * f64::from(px[0]) + plane[2] * f64::from(px[1]);
+                let times = f64::from(depth[i]) / at(inverse);
+                (u[i], v[i]) = ((at(of_u) * times) as f32, (at(of_v) * times) as f32);
+            }
             (across[0][i], down[0][i]) = (surface.u[1], surface.u[2]);
             (across[1][i], down[1][i]) = (surface.v[1], surface.v[2]);
             (across[2][i], down[2][i]) = (surface.inverse[1], surface.inverse[2]);

@@ -23,8 +23,8 @@ pub(super) struct Cover {
     pub at: [[i32; 2]; 3],
     /// near / z.
     pub inverse: Plane,
-    /// Whether all corners are so near the first pixel that 32 bits are exact.
-    pub is_small: bool,
+    /// As of [`Surface`].
+    pub large: u32,
 }
 
 /// What is on a triangle.
@@ -40,7 +40,13 @@ pub(super) struct Surface {
     pub inverse: Plane,
     /// Place in [`Chunk::more`].
     pub more: u32,
+    /// Place in [`Chunk::large`], or [`SMALL`].
+    pub large: u32,
 }
+
+/// Place of what is not in [`Chunk::large`]: triangles whose corners are all so near their first pixel that products of differences fit 32 bits, and that planes need no more digits than
+/// floats have.
+pub(super) const SMALL: u32 = u32::MAX;
 
 /// What triangles have in common.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +60,8 @@ pub(super) struct Kind {
 pub(super) struct Chunk {
     pub covers: Vec<Cover>,
     pub surfaces: Vec<Surface>,
+    /// Planes of large ones once more, near / z and texture coordinates: towards a horizon little is left of what they have at the other end.
+    pub large: Vec<[[f64; 3]; 3]>,
     /// Planes of what some have besides.
     pub more: Vec<[Plane; MORE]>,
     /// Triangles by the bands that they may be in, and where each band's begin.
@@ -67,6 +75,7 @@ impl Chunk {
         self.covers.clear();
         self.surfaces.clear();
         self.more.clear();
+        self.large.clear();
     }
 
     /// Those that may be in a band.
@@ -128,7 +137,8 @@ impl Chunk {
         let (top, bottom) = (ay.min(by).min(cy), ay.max(by).max(cy));
         // Pixels whose middles are within the box.
         let first = [((left + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0), ((top + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0)];
-        let last = [(right >> SUBPIXEL_BITS).min(camera.size_px[0] as i32 - 1), (bottom >> SUBPIXEL_BITS).min(camera.size_px[1] as i32 - 1)];
+        let last =
+            [(right >> SUBPIXEL_BITS).min(camera.size_px[0] as i32 - 1), (bottom >> SUBPIXEL_BITS).min(camera.size_px[1] as i32 - 1)];
         if first[0] > last[0] || first[1] > last[1] {
             return;
         }
@@ -142,16 +152,26 @@ impl Chunk {
         let at = [place(a), place(b), place(c)];
         let is_near = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
         let is_small = is_near(at[0]) & is_near(at[1]) & is_near(at[2]);
+        // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step of the grid is much towards a horizon.
         const PX: f32 = 1.0 / SUBPIXELS as f32;
-        let [x, y] = [at[0][0] as f32 * PX, at[0][1] as f32 * PX];
-        let [to_bx, to_by] = [(b.at[0] - ax) as f32 * PX, (b.at[1] - ay) as f32 * PX];
-        let [to_cx, to_cy] = [(c.at[0] - ax) as f32 * PX, (c.at[1] - ay) as f32 * PX];
-        let per_area = 1.0 / (area2.abs() as f32 * (PX * PX));
+        let first_px = [first[0] as f32, first[1] as f32];
+        let off = |of: &Corner<N>, from: [f32; 2]| [of.at_px[0] - from[0], of.at_px[1] - from[1]];
+        let (mut px, mut to_b, mut to_c) = (off(a, first_px), off(b, a.at_px), off(c, a.at_px));
+        let area2_px = area2.abs() as f32 * (PX * PX);
+        let mut area2_off = to_b[0] * to_c[1] - to_b[1] * to_c[0];
+        // Unless there is little left of it between them.
+        if !(0.5 * area2_px..2.0 * area2_px).contains(&area2_off) {
+            let on_grid = |to: [i32; 2], from: [i32; 2]| [(to[0] - from[0]) as f32 * PX, (to[1] - from[1]) as f32 * PX];
+            (px, to_b, to_c) = (on_grid(at[0], [0; 2]), on_grid(at[1], at[0]), on_grid(at[2], at[0]));
+            area2_off = area2_px;
+        }
+        let large = if is_small { SMALL } else { self.add_large(camera, [a, b, c], first_px) };
+        let per_area = 1.0 / area2_off;
         let plane = |of_a: f32, of_b: f32, of_c: f32| -> Plane {
-            let (to_b, to_c) = (of_b - of_a, of_c - of_a);
-            let across = (to_b * to_cy - to_c * to_by) * per_area;
-            let down = (to_c * to_bx - to_b * to_cx) * per_area;
-            [of_a - across * x - down * y, across, down]
+            let (of_b, of_c) = (of_b - of_a, of_c - of_a);
+            let across = (of_b * to_c[1] - of_c * to_b[1]) * per_area;
+            let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
+            [of_a - across * px[0] - down * px[1], across, down]
         };
         let times_inverse = |k: usize| plane(a.on_it[k] * a.inverse, b.on_it[k] * b.inverse, c.on_it[k] * c.inverse);
         let inverse = plane(a.inverse, b.inverse, c.inverse);
@@ -165,7 +185,33 @@ impl Chunk {
             }
             self.more.push(planes);
         }
-        self.covers.push(Cover { first, last, at, inverse, is_small });
-        self.surfaces.push(Surface { first: [f32::from(first[0]), f32::from(first[1])], paint: kind.paint, u: times_inverse(0), v: times_inverse(1), inverse, more });
+        self.covers.push(Cover { first, last, at, inverse, large });
+        self.surfaces.push(Surface {
+            first: [f32::from(first[0]), f32::from(first[1])],
+            paint: kind.paint,
+            u: times_inverse(0),
+            v: times_inverse(1),
+            inverse,
+            more,
+            large,
+        });
+    }
+
+    #[cold]
+    fn add_large<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], first_px: [f32; 2]) -> u32 {
+        let [a, b, c] = corners.map(|corner| camera.place_px(corner));
+        let px = [0, 1].map(|k| a[k] - f64::from(first_px[k]));
+        let [to_b, to_c] = [b, c].map(|to| [to[0] - a[0], to[1] - a[1]]);
+        let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
+        let plane = |of: [f64; 3]| {
+            let (of_b, of_c) = (of[1] - of[0], of[2] - of[0]);
+            let across = (of_b * to_c[1] - of_c * to_b[1]) * per_area;
+            let down = (of_c * to_b[0] - of_b * to_c[0]) * per_area;
+            [of[0] - across * px[0] - down * px[1], across, down]
+        };
+        let inverse = corners.map(|corner| f64::from(camera.uniforms.near_m) / f64::from(corner.in_camera_m[2]));
+        let times_inverse = |k: usize| plane([0, 1, 2].map(|corner: usize| f64::from(corners[corner].on_it[k]) * inverse[corner]));
+        self.large.push([plane(inverse), times_inverse(0), times_inverse(1)]);
+        self.large.len() as u32 - 1
     }
 }
