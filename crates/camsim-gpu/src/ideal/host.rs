@@ -207,7 +207,7 @@ impl HostScene {
     fn triangles(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &Job, chunk: &mut Chunk) {
         match job {
             Job::Terrain(of) => {
-                let kind = Kind { paint: GROUND, one_sided: false };
+                let kind = Kind { paint: GROUND, one_sided: false, sky: None };
                 let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
                 for triangle in indices.chunks_exact(3) {
                     let corner = |k: usize| &self.terrain[triangle[k] as usize];
@@ -216,11 +216,12 @@ impl HostScene {
             }
             Job::Piece { batch, level, piece, places } => {
                 let model = &self.models[*batch];
-                let kind = Kind { paint: *batch as u32 + 1, one_sided: model.one_sided };
+                let paint = *batch + 1;
+                let kind = Kind { paint: paint as u32, one_sided: model.one_sided, sky: self.paints[paint].sky };
                 let piece = &model.levels[*level][*piece];
                 for &place in &seen[places.clone()] {
                     let stands = &view.buffers.placed[place as usize];
-                    match self.paints[kind.paint as usize].has_more {
+                    match self.paints[paint].has_more {
                         true => piece.draw_more(camera, pose, stands, model.light, kind, chunk),
                         false => piece.draw(camera, pose, stands, kind, chunk),
                     }

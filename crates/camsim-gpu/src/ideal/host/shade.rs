@@ -9,10 +9,10 @@ use super::{
     cover::{CHUNK_BITS, SKY},
     picture::Picture,
     reads::{Colors, Places, colors, let_through},
-    triangles::{Chunk, MORE, Plane, SMALL, Surface},
+    triangles::{Chunk, FLAT, Kind, Plane, SMALL, Surface},
 };
 use crate::host::{
-    lanes::{LANES, Lanes, ZERO, each, higher, lower},
+    lanes::{LANES, Lanes, ZERO, each},
     vectors::Vectors,
 };
 
@@ -138,14 +138,18 @@ impl Shader<'_> {
         }
     }
 
-    /// Of a triangle that has its own, in the light if that falls on it. Twin of shaders/ideal/light.wgsl.
+    /// Of a triangle that has its own, in the light if that falls on it.
+    #[inline(always)]
     fn tint(&self, paint: &Paint, [x, y]: [usize; 2], shown: u32, z: f32) -> [f32; 3] {
         let surface = self.surface(shown);
-        let planes = &self.chunks[(shown >> CHUNK_BITS) as usize].more[surface.more as usize];
+        let chunk = &self.chunks[(shown >> CHUNK_BITS) as usize];
+        if surface.more & FLAT != 0 {
+            return chunk.flats[(surface.more & !FLAT) as usize];
+        }
+        let [r, g, b, sun, down] = &chunk.more[surface.more as usize];
         let px = [x as f32 - surface.first[0], y as f32 - surface.first[1]];
-        let [r, g, b, sun, down]: [f32; MORE] = planes.map(|plane| at(plane, px) * z);
-        let light = paint.sky.map_or(1.0, |sky| lower(higher(sun, 0.0) + sky * 0.5 * (1.0 - down), 1.0));
-        [r, g, b].map(|part| part * higher(light, 0.0))
+        let of = |plane: &Plane| at(*plane, px) * z;
+        Kind::lit(paint.sky, [of(r), of(g), of(b), of(sun), of(down)])
     }
 
     /// Twin of shaders/ideal/fog; sky where there is no surface; no mark anywhere.

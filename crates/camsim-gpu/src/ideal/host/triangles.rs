@@ -4,6 +4,7 @@ use super::{
     corners::{Camera, Corner, SUBPIXEL_BITS, SUBPIXELS},
     cover::SMALL_PX,
 };
+use crate::host::lanes::{higher, lower};
 
 /// Rows of the picture that are drawn together.
 pub(super) const BAND_ROWS: usize = 32;
@@ -38,7 +39,7 @@ pub(super) struct Surface {
     pub u: Plane,
     pub v: Plane,
     pub inverse: Plane,
-    /// Place in [`Chunk::more`].
+    /// Place in [`Chunk::more`], or with [`FLAT`] in [`Chunk::flats`].
     pub more: u32,
     /// Place in [`Chunk::large`], or [`SMALL`].
     pub large: u32,
@@ -48,11 +49,26 @@ pub(super) struct Surface {
 /// floats have.
 pub(super) const SMALL: u32 = u32::MAX;
 
+/// Says that all of a triangle has one tint and one light.
+pub(super) const FLAT: u32 = 1 << 31;
+
 /// What triangles have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     pub paint: u32,
     pub one_sided: bool,
+    /// Light of the sky, where light falls on them.
+    pub sky: Option<f32>,
+}
+
+impl Kind {
+    /// A tint in the light, from what a triangle has [`MORE`]. Twin of shaders/ideal/light.wgsl.
+    #[inline(always)]
+    pub fn lit(sky: Option<f32>, [r, g, b, sun, down]: [f32; MORE]) -> [f32; 3] {
+        let Some(sky) = sky else { return [r, g, b] };
+        let light = lower(higher(higher(sun, 0.0) + sky * 0.5 * (1.0 - down), 0.0), 1.0);
+        [r * light, g * light, b * light]
+    }
 }
 
 /// Triangles that are worked out together, in the order in which they are drawn.
@@ -64,6 +80,8 @@ pub(super) struct Chunk {
     pub large: Vec<[[f64; 3]; 3]>,
     /// Planes of what some have besides.
     pub more: Vec<[Plane; MORE]>,
+    /// Tints of those whose corners all have the same, and the same light.
+    pub flats: Vec<[f32; 3]>,
     /// Triangles by the bands that they may be in, and where each band's begin.
     in_band: Vec<u32>,
     band_starts: Vec<u32>,
@@ -76,6 +94,7 @@ impl Chunk {
         self.surfaces.clear();
         self.more.clear();
         self.large.clear();
+        self.flats.clear();
     }
 
     /// Those that may be in a band.
@@ -176,15 +195,7 @@ impl Chunk {
         let times_inverse = |k: usize| plane(a.on_it[k] * a.inverse, b.on_it[k] * b.inverse, c.on_it[k] * c.inverse);
         let inverse = plane(a.inverse, b.inverse, c.inverse);
         let [first, last] = [[first[0] as u16, first[1] as u16], [last[0] as u16, last[1] as u16]];
-        let more = self.more.len() as u32;
-        if N == 2 + MORE {
-            let mut planes: [Plane; MORE] = std::array::from_fn(|k| times_inverse(2 + k));
-            if !is_front {
-                // The side that is seen has its normal the other way.
-                planes[MORE - 2..].iter_mut().flatten().for_each(|number| *number = -*number);
-            }
-            self.more.push(planes);
-        }
+        let more = if N == 2 + MORE { self.add_more([a, b, c], kind.sky, is_front, times_inverse) } else { 0 };
         self.covers.push(Cover { first, last, at, inverse, large });
         self.surfaces.push(Surface {
             first: [f32::from(first[0]), f32::from(first[1])],
@@ -195,6 +206,25 @@ impl Chunk {
             more,
             large,
         });
+    }
+
+    /// Keeps what a triangle has besides; gives its place.
+    #[inline(always)]
+    fn add_more<const N: usize>(&mut self, corners: [&Corner<N>; 3], sky: Option<f32>, is_front: bool, plane: impl Fn(usize) -> Plane) -> u32 {
+        // The side that is seen from behind has its normal the other way.
+        let sign = if is_front { 1.0 } else { -1.0 };
+        let [a, b, c] = corners;
+        if a.on_it[2..] == b.on_it[2..] && a.on_it[2..] == c.on_it[2..] {
+            let of = |k: usize| if k < 3 { a.on_it[2 + k] } else { sign * a.on_it[2 + k] };
+            self.flats.push(Kind::lit(sky, [of(0), of(1), of(2), of(3), of(4)]));
+            return FLAT | (self.flats.len() as u32 - 1);
+        }
+        let (mut sun, mut down) = (plane(5), plane(6));
+        for k in 0..3 {
+            (sun[k], down[k]) = (sign * sun[k], sign * down[k]);
+        }
+        self.more.push([plane(2), plane(3), plane(4), sun, down]);
+        self.more.len() as u32 - 1
     }
 
     #[cold]
