@@ -134,10 +134,14 @@ impl Engine {
         let gpu = &self.gpu;
         let planner = Arc::new(Planner::new(sequence.clone(), channels, gpu.max_side_px())?);
         self.check_output(&planner)?;
-        let buffers = SceneBuffers::new(gpu, &sequence.scene)?;
+        let mut buffers = SceneBuffers::new(gpu, &sequence.scene)?;
         let preset = sequence.scenario.quality.preset;
         let ideal_pass = IdealPass::new(gpu, preset, buffers.tiles().is_some(), sequence.scene.fog_visibility_m)?;
-        let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &ideal_pass, &sequence, &buffers, planner.wants_truth())).collect();
+        let on_host = gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence, &buffers));
+        if !on_host.as_ref().is_some_and(OnHost::draws) {
+            buffers.bring_pictures(gpu, &sequence.scene);
+        }
+        let slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &sequence, planner.wants_truth())).collect();
         let session = Session {
             vignette: vignette(gpu, &sequence),
             noise_table: noise_table(gpu),
@@ -148,7 +152,7 @@ impl Engine {
             zoom_maps: HashMap::new(),
             targets: Vec::new(),
             drawn: None,
-            on_host: gpu.reverses_on_host().then(|| OnHost::new(gpu, &sequence, &buffers)),
+            on_host,
             slots,
             lists: None,
             buffers,
@@ -466,6 +470,7 @@ impl Session<'_> {
         self.targets.push(target);
         let target = self.targets.len() - 1;
         let sequence = self.planner.sequence();
+        self.buffers.bring_pictures(gpu, &sequence.scene);
         let ideal_slots = &mut self.slots[slot].ideal;
         while ideal_slots.len() < plan.keys.len() {
             ideal_slots.push(self.ideal_pass.slot(gpu, &self.buffers));

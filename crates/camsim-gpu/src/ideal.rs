@@ -205,7 +205,7 @@ impl IdealPass {
         })
     }
 
-    /// Buffers for one ideal frame of this scene.
+    /// Buffers for one ideal frame of this scene, whose pictures are there.
     #[must_use]
     pub fn slot(&self, gpu: &GpuContext, buffers: &SceneBuffers) -> IdealSlot {
         let create = |label, size: u64, usage| {
@@ -225,11 +225,11 @@ impl IdealPass {
         let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
         let camera_group = group(&self.camera_layout, &[entry(0, camera.as_entire_binding())]);
         let terrain = buffers.terrain.as_ref().map(|_| TerrainSlot::new(gpu));
-        let mesh_groups = buffers.batches.iter().map(|batch| {
+        let mesh_groups = buffers.batches.iter().zip(&buffers.pictures).map(|(batch, picture)| {
             group(
                 &self.mesh_layout,
                 &[
-                    entry(0, wgpu::BindingResource::TextureView(&batch.texture)),
+                    entry(0, wgpu::BindingResource::TextureView(picture)),
                     entry(1, wgpu::BindingResource::Sampler(&batch.sampler)),
                     entry(2, batch.material.as_entire_binding()),
                 ],

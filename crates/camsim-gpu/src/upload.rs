@@ -22,6 +22,8 @@ pub struct SceneBuffers {
     pub terrain: Option<TerrainBuffers>,
     /// Meshes by shape and material.
     pub batches: Vec<MeshBatch>,
+    /// Their pictures, once they have been [brought](SceneBuffers::bring_pictures).
+    pub pictures: Vec<wgpu::TextureView>,
     /// Where all meshes stand, those of a batch one after the other.
     pub placed: Vec<PlacedShape>,
     /// Boxes around them, NED.
@@ -40,8 +42,8 @@ pub struct TerrainBuffers {
 /// The picture on the ground.
 #[derive(Debug)]
 pub enum GroundPicture {
-    /// In one texture.
-    Whole(wgpu::TextureView),
+    /// In one texture, once that has been [brought](SceneBuffers::bring_pictures).
+    Whole(Option<wgpu::TextureView>),
     /// Too large for one.
     Tiles(Box<TilePool>),
 }
@@ -63,8 +65,6 @@ pub struct MeshBatch {
     pub look: Material,
     /// As above; none where it has no normals.
     pub light: Option<Light>,
-    /// Picture.
-    pub texture: wgpu::TextureView,
     /// What it shows outside of the picture.
     pub sampler: wgpu::Sampler,
     /// Normals, where light falls on them.
@@ -114,14 +114,15 @@ pub struct PlacedShape {
 }
 
 impl SceneBuffers {
-    /// Uploads a scene.
+    /// Uploads a scene, but for its pictures.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`] for what the adapter cannot hold.
     pub fn new(gpu: &GpuContext, scene: &Scene) -> Result<Self, GpuError> {
         let sampler = create_sampler(gpu, [Wrap::Clamp; 2], false);
         let terrain = scene.terrain.as_ref().map(|terrain| upload_terrain(gpu, terrain)).transpose()?;
-        let (batches, order) = upload_meshes(gpu, scene)?;
+        let (batches, order) = upload_meshes(gpu, scene);
+        batches.iter().try_for_each(|batch| check_picture(gpu, &batch.look.texture, "the picture of a mesh or pattern"))?;
         let meshes = || order.iter().filter_map(|&i| scene.meshes.get(i));
         let place = |mesh: &Mesh| {
             let &Mesh { origin_ned_m, ned_from_shape, .. } = mesh;
@@ -129,11 +130,24 @@ impl SceneBuffers {
         };
         let placed = meshes().map(place).collect();
         let bounds = meshes().map(Mesh::bounds).collect();
-        Ok(Self { terrain, batches, placed, bounds, sampler })
+        Ok(Self { terrain, batches, pictures: Vec::new(), placed, bounds, sampler })
     }
-}
 
-impl SceneBuffers {
+    /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the device needs none. What several share is uploaded once.
+    pub fn bring_pictures(&mut self, gpu: &GpuContext, scene: &Scene) {
+        if let (Some(terrain), Some(TerrainBuffers { picture: GroundPicture::Whole(picture) })) = (&scene.terrain, &mut self.terrain) {
+            picture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture));
+        }
+        if self.pictures.len() < self.batches.len() {
+            let mut known: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
+            let picture = |batch: &MeshBatch| {
+                let texture = &batch.look.texture;
+                known.entry(Arc::as_ptr(texture)).or_insert_with(|| upload_texture(gpu, texture)).clone()
+            };
+            self.pictures = self.batches.iter().map(picture).collect();
+        }
+    }
+
     /// The tiles of the ground's picture, if it is not whole.
     pub(crate) fn tiles(&self) -> Option<&TilePool> {
         self.terrain.as_ref().and_then(|terrain| match &terrain.picture {
@@ -170,14 +184,17 @@ fn create_sampler(gpu: &GpuContext, wrap: [Wrap; 2], nearest: bool) -> wgpu::Sam
 
 fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers, GpuError> {
     let picture = match is_whole(terrain.texture.size_px, gpu.max_picture_px) {
-        true => GroundPicture::Whole(upload_texture(gpu, &terrain.texture, "scene.terrain.ortho")?),
+        true => {
+            check_picture(gpu, &terrain.texture, "scene.terrain.ortho")?;
+            GroundPicture::Whole(None)
+        }
         false => GroundPicture::Tiles(Box::new(TilePool::new(terrain, gpu.texels))),
     };
     Ok(TerrainBuffers { picture })
 }
 
-/// Batches, and the meshes' order in them. Shapes and pictures that several share are uploaded once.
-fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec<usize>), GpuError> {
+/// Batches, and the meshes' order in them. Shapes that several share are uploaded once.
+fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> (Vec<MeshBatch>, Vec<usize>) {
     let mut groups: Vec<(&Mesh, Vec<usize>)> = Vec::new();
     let mut known: HashMap<*const Shape, Vec<usize>> = HashMap::new();
     for (i, mesh) in scene.meshes.iter().enumerate() {
@@ -191,20 +208,13 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> Result<(Vec<MeshBatch>, Vec
         }
     }
     let levels = SceneLevels::new(scene);
-    let mut textures: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
     let (mut batches, mut order) = (Vec::new(), Vec::new());
     for (mesh, members) in groups {
-        let key = Arc::as_ptr(&mesh.material.texture);
-        let texture = match textures.get(&key) {
-            Some(view) => view.clone(),
-            None => upload_texture(gpu, &mesh.material.texture, "the picture of a mesh or pattern")?,
-        };
-        textures.insert(key, texture.clone());
         let first = order.len() as u32;
         order.extend(members);
-        batches.push(upload_batch(gpu, mesh, scene.light, levels.of(&mesh.shape), texture, first..order.len() as u32));
+        batches.push(upload_batch(gpu, mesh, scene.light, levels.of(&mesh.shape), first..order.len() as u32));
     }
-    Ok((batches, order))
+    (batches, order)
 }
 
 fn upload_batch(
@@ -212,7 +222,6 @@ fn upload_batch(
     mesh: &Mesh,
     light: Option<Light>,
     levels: Arc<ShapeLevels>,
-    texture: wgpu::TextureView,
     members: Range<u32>,
 ) -> MeshBatch {
     let (shape, material) = (&mesh.shape, &mesh.material);
@@ -239,7 +248,6 @@ fn upload_batch(
         shape: shape.clone(),
         look: mesh.material.clone(),
         light,
-        texture,
         sampler: create_sampler(gpu, material.wrap, material.nearest),
         material: buffer("camsim.mesh.material", bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM),
         kind: MeshKind { one_sided: material.one_sided, holes: material.cutoff.is_some(), lit: light.is_some(), blends: material.blends },
@@ -256,17 +264,23 @@ pub(crate) fn texture_format(encoding: Encoding, form: TexelForm) -> wgpu::Textu
     }
 }
 
-fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgpu::TextureView, GpuError> {
+/// Refuses a picture that the adapter cannot hold.
+fn check_picture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), GpuError> {
     let [width, height] = texture.size_px;
-    if width.max(height) > gpu.max_side_px() {
-        return Err(GpuError::TooLarge {
-            what: format!("{what} ({width}x{height} px)"),
-            needed: u64::from(width.max(height)),
-            limit_name: "max_texture_dimension_2d",
-            limit: u64::from(gpu.max_side_px()),
-            fix: "reduce the picture",
-        });
+    if width.max(height) <= gpu.max_side_px() {
+        return Ok(());
     }
+    Err(GpuError::TooLarge {
+        what: format!("{what} ({width}x{height} px)"),
+        needed: u64::from(width.max(height)),
+        limit_name: "max_texture_dimension_2d",
+        limit: u64::from(gpu.max_side_px()),
+        fix: "reduce the picture",
+    })
+}
+
+fn upload_texture(gpu: &GpuContext, texture: &Texture) -> wgpu::TextureView {
+    let [width, height] = texture.size_px;
     let form = match (texture.encoding, texture.size_px) {
         // Every device has the exact light of these bytes, and there are no smaller versions: a half would only round.
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
@@ -290,5 +304,5 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<wgp
         wgpu::util::TextureDataOrder::LayerMajor,
         &data,
     );
-    Ok(on_device.create_view(&wgpu::TextureViewDescriptor::default()))
+    on_device.create_view(&wgpu::TextureViewDescriptor::default())
 }

@@ -37,7 +37,7 @@ impl Session<'_> {
         let same_size = old.camera.size_px == new.camera.size_px;
         if !same_size || planner.wants_truth() != self.planner.wants_truth() {
             let truth = planner.wants_truth();
-            self.slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &self.ideal_pass, &sequence, &self.buffers, truth)).collect();
+            self.slots = (0..FRAMES_IN_FLIGHT).map(|_| Slot::new(gpu, &sequence, truth)).collect();
             self.drawn = None;
         }
         if !same_size {

@@ -5,12 +5,11 @@ use camsim_core::sequence::Sequence;
 use super::{FRAMES_IN_FLIGHT, readback::Output};
 use crate::{
     context::GpuContext,
-    ideal::{IdealPass, IdealSlot, IdealTarget},
+    ideal::{IdealSlot, IdealTarget},
     layout::{FrameUniforms, Truth},
     recorder::PassClock,
     reverse::{ReverseGroups, list_size},
     staging::Staging,
-    upload::SceneBuffers,
 };
 
 /// Textures of ideal frames, and what each frame in flight reads them by.
@@ -35,7 +34,7 @@ pub(super) struct Slot {
 }
 
 impl Slot {
-    pub fn new(gpu: &GpuContext, ideal_pass: &IdealPass, sequence: &Sequence, buffers: &SceneBuffers, truth: bool) -> Self {
+    pub fn new(gpu: &GpuContext, sequence: &Sequence, truth: bool) -> Self {
         let [width, height] = sequence.scenario.camera.size_px.map(u64::from);
         let frame = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("camsim.frame"),
@@ -45,7 +44,7 @@ impl Slot {
         });
         Self {
             staging: None,
-            ideal: vec![ideal_pass.slot(gpu, buffers)],
+            ideal: Vec::new(),
             frame,
             poses: pose_buffer(gpu, 48 * width.max(height)),
             color: Output::new(gpu, "camsim.color", 16 * width * height),

@@ -135,7 +135,7 @@ impl TerrainSlot {
         sampler: &wgpu::Sampler,
     ) {
         let view = match &terrain.picture {
-            GroundPicture::Whole(view) => Some(view),
+            GroundPicture::Whole(view) => view.as_ref(),
             GroundPicture::Tiles(tiles) => {
                 self.tell_tiles(gpu, recorder, tiles);
                 tiles.view()
