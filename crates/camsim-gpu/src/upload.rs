@@ -217,13 +217,7 @@ fn upload_meshes(gpu: &GpuContext, scene: &Scene) -> (Vec<MeshBatch>, Vec<usize>
     (batches, order)
 }
 
-fn upload_batch(
-    gpu: &GpuContext,
-    mesh: &Mesh,
-    light: Option<Light>,
-    levels: Arc<ShapeLevels>,
-    members: Range<u32>,
-) -> MeshBatch {
+fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc<ShapeLevels>, members: Range<u32>) -> MeshBatch {
     let (shape, material) = (&mesh.shape, &mesh.material);
     let light = light.filter(|_| shape.has_normals());
     let vertices: Vec<MeshVertexData> = shape.vertices.iter().map(MeshVertexData::from).collect();

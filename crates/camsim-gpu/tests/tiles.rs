@@ -47,6 +47,8 @@ fn flight(ground: &Scene, max_error_dn: f64, pitch_deg: f64) -> Arc<Sequence> {
 /// Ideal frames with the picture whole (`None`) or in tiles, how they read it, and tiles on the device, of all.
 fn ideal_frames(sequence: &Arc<Sequence>, limit_px: Option<u32>, frames: &[u64]) -> (Vec<IdealImages>, SurfaceReads, Option<[usize; 2]>) {
     let mut engine = engine();
+    // Tiles are the device's alone.
+    engine.set_ideal_on_host(false);
     if let Some(limit_px) = limit_px {
         engine.limit_pictures(limit_px);
     }

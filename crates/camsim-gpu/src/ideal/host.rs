@@ -30,6 +30,8 @@ mod models;
 mod picture;
 mod reads;
 mod shade;
+#[cfg(test)]
+mod tests;
 mod triangles;
 
 use corners::{Camera, Corner};

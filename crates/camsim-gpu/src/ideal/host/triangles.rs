@@ -210,7 +210,13 @@ impl Chunk {
 
     /// Keeps what a triangle has besides; gives its place.
     #[inline(always)]
-    fn add_more<const N: usize>(&mut self, corners: [&Corner<N>; 3], sky: Option<f32>, is_front: bool, plane: impl Fn(usize) -> Plane) -> u32 {
+    fn add_more<const N: usize>(
+        &mut self,
+        corners: [&Corner<N>; 3],
+        sky: Option<f32>,
+        is_front: bool,
+        plane: impl Fn(usize) -> Plane,
+    ) -> u32 {
         // The side that is seen from behind has its normal the other way.
         let sign = if is_front { 1.0 } else { -1.0 };
         let [a, b, c] = corners;

@@ -1,0 +1,172 @@
+//! Triangles that share borders cover each pixel once, whatever their size and wherever they are cut.
+
+#![allow(clippy::unwrap_used)]
+
+use camsim_core::noise::pcg4d;
+
+use super::{
+    corners::{Camera, Corner, SUBPIXELS},
+    cover::{BEYOND, Band, SKY, SMALL_PX},
+    triangles::{BAND_ROWS, Chunk, Kind},
+};
+use crate::layout::IdealCamera;
+
+const SIZE_PX: [u32; 2] = [200, 150];
+const KIND: Kind = Kind { paint: 0, one_sided: false, sky: None };
+
+fn camera() -> Camera {
+    let uniforms = IdealCamera {
+        camera_from_ned_x: [1.0, 0.0, 0.0, 0.0],
+        camera_from_ned_y: [0.0, 1.0, 0.0, 0.0],
+        camera_from_ned_z: [0.0, 0.0, 1.0, 0.0],
+        near_m: 0.05,
+        ..IdealCamera::default()
+    };
+    Camera { uniforms, focal_px: [100.0, 100.0], principal_px: [99.5, 74.5], size_px: SIZE_PX }
+}
+
+fn random(k: u32) -> [f32; 4] {
+    pcg4d([k, 3, 7, 31]).map(|bits| (bits >> 8) as f32 / (1 << 24) as f32)
+}
+
+/// How often each pixel is covered by triangles that do not hide each other, and what they are drawn as.
+fn covered(triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
+    let camera = camera();
+    let [width, height] = SIZE_PX.map(|side| side as usize);
+    let stride = width + BEYOND;
+    let mut counts = vec![0; width * height];
+    let (mut chunk, mut kinds) = (Chunk::default(), [0; 2]);
+    for [a, b, c] in triangles {
+        chunk.clear();
+        chunk.add(&camera, [a, b, c], kind);
+        chunk.sort(height.div_ceil(BAND_ROWS));
+        kinds = [kinds[0] + chunk.covers.len() - chunk.large.len(), kinds[1] + chunk.large.len()];
+        for first_row in (0..height).step_by(BAND_ROWS).filter(|row| !chunk.of_band(row / BAND_ROWS).is_empty()) {
+            let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
+            Band { first_row, stride, depth: &mut depth, shown: &mut shown }.draw(&chunk, 0);
+            for (row, shown) in shown.chunks_exact(stride).enumerate() {
+                assert!(shown[width..].iter().all(|&shown| shown == SKY), "nothing beyond the picture");
+                let is_row = first_row + row < height;
+                assert!(is_row || shown.iter().all(|&shown| shown == SKY), "nothing below it");
+                let counts = counts.iter_mut().skip(width * (first_row + row)).take(if is_row { width } else { 0 });
+                counts.zip(shown).for_each(|(count, &shown)| *count += u32::from(shown != SKY));
+            }
+        }
+    }
+    (counts, kinds)
+}
+
+/// A plane of so many cells, each a pair of triangles, whose inner corners are shaken by a fifth of a cell, seen through `place` from places in it, 0..=1.
+fn sheet(cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Corner<2>; 3]> {
+    let camera = camera();
+    let corner = |x: u32, y: u32| {
+        let [across, down, ..] = random(x * 1000 + y);
+        let shake = |side: u32, by: f32| if side == 0 || side == cells { 0.0 } else { 0.4 * (by - 0.5) };
+        let at = [(x as f32 + shake(x, across)) / cells as f32, (y as f32 + shake(y, down)) / cells as f32];
+        camera.corner(camera.in_camera_m(place(at)), at)
+    };
+    let pair = |x: u32, y: u32| {
+        let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
+        // Turning both ways.
+        if (x + y) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, d, b], [d, b, c]] }
+    };
+    (0..cells * cells).flat_map(|k| pair(k % cells, k / cells)).collect()
+}
+
+#[test]
+fn pixels_are_covered_once() {
+    // From 0.3 to 400 px a cell; past all borders, so that corners far beyond them are cut; and steep towards the camera, so that some are behind it.
+    let wall = |side_m: f32| move |[x, y]: [f32; 2]| [side_m * (x - 0.5), side_m * (y - 0.5), 10.0];
+    let floor = |[x, y]: [f32; 2]| [400.0 * (x - 0.5), 2.0, 400.0 * (y - 0.5)];
+    for (name, triangles, has) in [
+        ("small", sheet(60, wall(22.0)), [true, false]),
+        ("tiny", sheet(400, wall(21.0)), [true, false]),
+        ("middle", sheet(7, wall(40.0)), [true, true]),
+        ("large", sheet(2, wall(60.0)), [false, true]),
+        ("beyond all borders", sheet(3, wall(90_000.0)), [false, true]),
+        ("many beyond all borders", sheet(40, wall(40_000.0)), [false, true]),
+    ] {
+        let (counts, [small, large]) = covered(&triangles, KIND);
+        assert!(
+            counts.iter().all(|&count| count == 1),
+            "{name}: {} of {} pixels",
+            counts.iter().filter(|&&count| count != 1).count(),
+            counts.len()
+        );
+        assert_eq!([small > 0, large > 0], has, "{name}: {small} small, {large} large");
+    }
+    let (counts, _) = covered(&sheet(9, floor), KIND);
+    let (above, below) = counts.split_at(74 * SIZE_PX[0] as usize);
+    assert!(above.iter().all(|&count| count == 0), "nothing above the horizon");
+    // The floor ends 200 m away, one pixel below the horizon; its nearest row is 2.7 m away.
+    assert!(below[2 * SIZE_PX[0] as usize..].iter().all(|&count| count == 1), "all of the floor, once");
+}
+
+#[test]
+fn one_side_is_there_from_where_it_turns_anticlockwise() {
+    let camera = camera();
+    let corner = |x: f32, y: f32| camera.corner([x, y, 10.0], [0.0; 2]);
+    let [a, b, c] = [corner(-3.0, -3.0), corner(-3.0, 3.0), corner(3.0, 3.0)];
+    let count = |triangle, one_sided| covered(&[triangle], Kind { one_sided, ..KIND }).0.iter().sum::<u32>();
+    let both = count([a, b, c], false);
+    assert!(both > 1000);
+    // Down, then to the right: anticlockwise as the picture is seen.
+    assert_eq!([count([a, b, c], true), count([a, c, b], true), count([a, c, b], false)], [both, 0, both]);
+}
+
+#[test]
+fn small_triangles_cover_what_64_bits_say() {
+    let camera = camera();
+    let mut pixels = 0;
+    for k in 0..400 {
+        let corner = |n: u32| {
+            let [x, y, z, _] = random(7 * k + n);
+            camera.corner([4.0 * (x - 0.5), 4.0 * (y - 0.5), 10.0 + 4.0 * z], [x, y])
+        };
+        let triangle = [corner(0), corner(1), corner(2)];
+        let (counts, [small, large]) = covered(&[triangle], KIND);
+        assert_eq!((small <= 1, large), (true, 0));
+        // On the grid, in 64 bits.
+        let inside = |x: i64, y: i64| {
+            let side = |a: usize, b: usize| {
+                let ([ax, ay], [bx, by]) = (triangle[a].at.map(i64::from), triangle[b].at.map(i64::from));
+                (bx - ax) * (y - ay) - (by - ay) * (x - ax)
+            };
+            let sides = [side(0, 1), side(1, 2), side(2, 0)];
+            (sides.iter().all(|&side| side > 0) || sides.iter().all(|&side| side < 0), sides.contains(&0))
+        };
+        for (i, &count) in counts.iter().enumerate() {
+            let [x, y] = [i as i64 % i64::from(SIZE_PX[0]), i as i64 / i64::from(SIZE_PX[0])].map(|px| px * i64::from(SUBPIXELS));
+            let (is_inside, is_on_border) = inside(x, y);
+            assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, pixel {i}");
+            pixels += count;
+        }
+    }
+    assert!(pixels > 10_000, "{pixels}");
+}
+
+#[test]
+fn numbers_that_are_none_draw_nothing() {
+    let camera = camera();
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, 1e-42, 0.0];
+    for (k, &number) in bad.iter().enumerate() {
+        for axis in 0..3 {
+            let mut at = [0.5, 0.25, 8.0];
+            at[axis] = number;
+            let corners =
+                [camera.corner(at, [0.0; 2]), camera.corner([1.0, 2.0, 9.0], [1.0; 2]), camera.corner([-2.0, 1.0, 9.0], [1.0; 2])];
+            // Whatever is drawn: no panic, and no pixel twice.
+            let (counts, _) = covered(&[corners], KIND);
+            assert!(counts.iter().all(|&count| count <= 1), "{k} {axis}");
+            assert!(number.is_finite() || axis == 2 || counts.iter().all(|&count| count == 0), "{number} {axis}");
+        }
+    }
+}
+
+#[test]
+fn products_of_small_triangles_fit_32_bits() {
+    // The largest number of `small`: three sums of products of differences of corners with places up to the last pixel side by side.
+    let corner = i64::from(SMALL_PX * SUBPIXELS);
+    let farthest = i64::from((2 * SMALL_PX + BEYOND as i32) * SUBPIXELS) - corner;
+    assert!(2 * (2 * corner) * (farthest + corner) <= i64::from(i32::MAX), "{}", 2 * (2 * corner) * (farthest + corner));
+}
