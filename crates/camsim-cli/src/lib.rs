@@ -44,7 +44,7 @@ Exit codes:
   3  no usable graphics adapter
 
 CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`). CAMSIM_REVERSE=device or host says where output frames are made from
-ideal frames (`camsim info --help`).";
+ideal frames, CAMSIM_IDEAL=device or host where those are drawn (`camsim info --help`).";
 
 /// Pictures of a real, imperfect airborne camera, and the truth about them.
 #[derive(Debug, Parser)]

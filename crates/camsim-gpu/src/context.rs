@@ -172,10 +172,10 @@ fn reverse_on(is_software: bool) -> Result<ReverseOn, GpuError> {
     }
 }
 
-/// Whether the host draws ideal frames itself: as `CAMSIM_IDEAL` says, or else where it has the reverse pipeline by default.
-fn ideal_on_host(reverse_on: ReverseOn) -> Result<bool, GpuError> {
+/// Whether the host draws the ideal frames that it makes output frames from: as `CAMSIM_IDEAL` says, or else beside a software adapter, unless other shaders are to be tried.
+fn ideal_on_host(is_software: bool, reverse_on: ReverseOn) -> Result<bool, GpuError> {
     match std::env::var_os("CAMSIM_IDEAL") {
-        None => Ok(reverse_on == ReverseOn::Best),
+        None => Ok(is_software && reverse_on != ReverseOn::Device && std::env::var_os("CAMSIM_SHADER_DIR").is_none()),
         Some(place) if place == "device" => Ok(false),
         Some(place) if place == "host" => Ok(true),
         Some(place) => {
@@ -188,7 +188,7 @@ impl GpuContext {
     /// Opens the chosen adapter.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses, [`GpuError::Setting`] if `CAMSIM_REVERSE` says neither place.
+    /// [`GpuError::NoAdapter`] with nothing to run on, [`GpuError::NoDevice`] when the adapter refuses, [`GpuError::Setting`] if `CAMSIM_REVERSE` or `CAMSIM_IDEAL` says neither place.
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut candidates = ranked(choice);
         if candidates.is_empty() {
@@ -213,14 +213,18 @@ impl GpuContext {
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
         let reverse_on = reverse_on(is_software)?;
-        let ideal_on_host = ideal_on_host(reverse_on)?;
+        let ideal_on_host = ideal_on_host(is_software, reverse_on)?;
         Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverse_on, ideal_on_host })
     }
 
     /// What renders, for people: the adapter, and that the host has a part in it where it has.
     #[must_use]
     pub fn describe(&self) -> String {
-        let host = if self.reverses_on_host() { ", reverse pipeline on the host" } else { "" };
+        let host = match (self.reverses_on_host(), self.draws_on_host()) {
+            (true, true) => ", ideal frames and reverse pipeline on the host",
+            (true, false) => ", reverse pipeline on the host",
+            (false, _) => "",
+        };
         format!("{}{host}", self.adapter)
     }
 
@@ -228,6 +232,12 @@ impl GpuContext {
     #[must_use]
     pub fn reverses_on_host(&self) -> bool {
         self.reverse_on != ReverseOn::Device
+    }
+
+    /// Whether the host draws the ideal frames of those, where it can.
+    #[must_use]
+    pub fn draws_on_host(&self) -> bool {
+        self.ideal_on_host && self.reverses_on_host()
     }
 
     /// Largest side of a texture.

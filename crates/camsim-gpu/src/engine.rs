@@ -13,7 +13,7 @@ use crate::{
     recorder::{PassClock, Recorder},
     reverse::{
         EMPTY_LIST, ReverseBindings, ReversePass, frame_uniforms,
-        host::ReverseOn,
+        host::{self, ReverseOn},
         lens_inverse::{LensInversePass, LensMap},
     },
     shaders::ComposeError,
@@ -360,7 +360,7 @@ impl Session<'_> {
 
     /// What the host makes the output frame from, where it makes frames like this.
     fn bring_to_host(&mut self, recorder: &mut Recorder<'_>, plan: &FramePlan) -> Option<HostFrame> {
-        let on_host = self.on_host.as_mut().filter(|_| self.engine.gpu.reverse_on.is_host(plan))?;
+        let on_host = self.on_host.as_mut().filter(|on_host| on_host.makes(plan, self.engine.gpu.reverse_on))?;
         let drawn = self.drawn.as_mut()?;
         let gpu = &self.engine.gpu;
         on_host.copy_map(gpu, recorder, plan, self.lens_map.as_ref().map(|(_, map)| map));
@@ -401,7 +401,7 @@ impl Session<'_> {
         let plan = &prepared.plan;
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         let models = plan.model_tolerance(&self.planner.sequence().scenario.quality);
-        let by_host = self.engine.gpu.reverse_on.is_host(plan) && self.on_host.as_ref().is_some_and(OnHost::draws);
+        let by_host = self.on_host.as_ref().is_some_and(|on_host| on_host.draws() && host::serves(plan));
         let by_device = reverses_on_device(plan, by_host.then_some(()));
         if self.drawn.as_ref().is_some_and(|drawn| {
             (drawn.target.is_some() || !by_device)

@@ -22,7 +22,7 @@ use crate::{
 
 mod drawing;
 mod fine;
-pub(crate) mod host;
+pub mod host;
 mod layers;
 mod marks;
 mod near_marks;

@@ -7,7 +7,10 @@ use camsim_core::{
     sequence::Sequence,
     tracker::{ResolvedLimits, Saturation},
 };
-use camsim_gpu::reverse::host::ReverseOn;
+use camsim_gpu::{
+    ideal::host::draws,
+    reverse::host::{self, ReverseOn},
+};
 use camsim_io::{load::Loaded, terrain::TerrainSummary};
 use serde::Serialize;
 
@@ -158,8 +161,8 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
-    if ReverseOn::Best.is_host(&plan) {
-        console.line(format_args!("on a software adapter the host runs the reverse pipeline of this frame (`camsim info --help`)"))?;
+    if let Some(part) = part_of_host(&loaded.sequence, &plan) {
+        console.line(format_args!("on a software adapter the host {part} of this frame (`camsim info --help`)"))?;
     }
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {
         console.line("terrain in this frame")?;
@@ -178,6 +181,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+/// What the host does there in place of the device.
+fn part_of_host(sequence: &Sequence, plan: &FramePlan) -> Option<&'static str> {
+    match host::serves(plan) && draws(&sequence.scene, MAX_SIDE_PX) {
+        true if plan.looks_for_itself() => Some("draws the ideal frame for its colours, as the device does for the truth, and runs the reverse pipeline"),
+        true => Some("draws the ideal frame and runs the reverse pipeline"),
+        false => ReverseOn::Best.is_host(plan).then_some("runs the reverse pipeline"),
+    }
 }
 
 /// As the ideal pass chooses for its middle key.

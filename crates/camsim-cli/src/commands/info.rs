@@ -11,7 +11,7 @@ use crate::{console::Console, failure::Failure};
 /// Show graphics adapters, driver and limits, and which one is used
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host makes output frames from ideal frames where that takes less time; CAMSIM_REVERSE=device leaves them to the\nadapter, CAMSIM_REVERSE=host makes all that it can, beside any adapter. Pictures differ by rounding."
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host draws ideal frames and makes output frames from them where it can; CAMSIM_REVERSE=device leaves both to the\nadapter, CAMSIM_REVERSE=host makes all output frames that it can, beside any adapter; CAMSIM_IDEAL=device or host says who draws the ideal\nframes of those. Pictures differ by rounding."
 )]
 pub struct Args {
     /// Print JSON
@@ -26,6 +26,8 @@ struct Info {
     max_side_px: u32,
     max_storage_buffer_bytes: u64,
     reverse_on_host: bool,
+    /// And whether it draws the ideal frames of those, where it can.
+    ideal_on_host: bool,
     cpu_threads: usize,
 }
 
@@ -56,6 +58,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         max_side_px: engine.gpu().max_side_px(),
         max_storage_buffer_bytes: limits.max_storage_buffer_binding_size.min(limits.max_buffer_size),
         reverse_on_host: engine.gpu().reverses_on_host(),
+        ideal_on_host: engine.gpu().draws_on_host(),
         cpu_threads: std::thread::available_parallelism().map_or(1, usize::from),
     };
     if args.json {

@@ -16,7 +16,7 @@ use crate::{
     layout::{FrameUniforms, Truth},
     recorder::Recorder,
     reverse::{
-        host::{HostInputs, HostKernel, IdealOnHost, LensMapOnHost},
+        host::{self, HostInputs, HostKernel, IdealOnHost, LensMapOnHost, ReverseOn},
         lens_inverse::LensMap,
     },
     upload::SceneBuffers,
@@ -72,7 +72,7 @@ impl OnHost {
     pub fn new(gpu: &GpuContext, sequence: &Sequence, buffers: &SceneBuffers) -> Self {
         Self {
             kernel: HostKernel::new(),
-            scene: gpu.ideal_on_host.then(|| HostScene::new(&sequence.scene, buffers)).flatten(),
+            scene: gpu.ideal_on_host.then(|| HostScene::new(&sequence.scene, buffers, gpu.max_picture_px)).flatten(),
             vignette: super::renew::vignette_weights_of(sequence).1,
             map: None,
             map_copy: None,
@@ -106,6 +106,11 @@ impl OnHost {
         let rows = Rows::new(gpu, "camsim.lens_map", [map.texture.width(), map.texture.height()], size_of::<[f32; 2]>());
         rows.copy(recorder.encoder(), &map.texture);
         self.recorded.map = Some(rows);
+    }
+
+    /// Whether it makes frames of a plan: if it draws their ideal frames itself there is no copy that they must be worth.
+    pub fn makes(&self, plan: &FramePlan, place: ReverseOn) -> bool {
+        if self.draws() { host::serves(plan) } else { place.is_host(plan) }
     }
 
     /// Whether it draws ideal frames itself.

@@ -11,7 +11,7 @@ use std::{collections::HashMap, ops::Range, sync::Arc};
 use camsim_core::{
     plan::{FramePlan, SurfaceReads},
     pose::CameraPose,
-    scene::{LevelTolerance, Light, PlacedMesh, Scene, Texture, Wrap},
+    scene::{LevelTolerance, Light, Material, PlacedMesh, Scene, Terrain, Texture, Wrap, is_whole},
 };
 use rayon::prelude::*;
 
@@ -21,7 +21,7 @@ use crate::{
         lanes::LANES,
         vectors::{Vectors, widest},
     },
-    upload::{GroundPicture, MeshBatch, SceneBuffers},
+    upload::{MeshBatch, SceneBuffers},
 };
 
 mod corners;
@@ -111,22 +111,28 @@ pub(crate) struct View<'a> {
     pub tolerance: &'a LevelTolerance,
 }
 
+/// Whether the host can draw a scene: not with pictures larger than a texture, mirrored beyond their borders or with sharp texels, with holes, or with blended surfaces, which only the
+/// device draws.
+#[must_use]
+pub fn draws(scene: &Scene, max_picture_px: u32) -> bool {
+    let is_whole = |terrain: &Terrain| is_whole(terrain.texture.size_px, max_picture_px);
+    let is_plain = |look: &Material| look.cutoff.is_none() && !look.blends && picture::is_read(&look.texture, look.wrap, look.nearest);
+    scene.terrain.as_ref().is_none_or(is_whole) && scene.meshes.iter().all(|mesh| is_plain(&mesh.material))
+}
+
 impl HostScene {
-    /// None for a scene with what only the device draws: pictures in tiles, mirrored beyond their borders or with sharp texels, holes, and blended surfaces.
-    pub fn new(scene: &Scene, buffers: &SceneBuffers) -> Option<Self> {
-        if buffers.batches.iter().any(|batch| batch.kind.holes || batch.kind.blends) {
+    /// None for a scene that the host does not [draw](draws).
+    pub fn new(scene: &Scene, buffers: &SceneBuffers, max_picture_px: u32) -> Option<Self> {
+        if !draws(scene, max_picture_px) {
             return None;
         }
         let mut pictures = Pictures::default();
-        let ground = match (&scene.terrain, &buffers.terrain) {
-            (Some(_), Some(on_device)) if matches!(on_device.picture, GroundPicture::Tiles(_)) => return None,
-            (Some(terrain), _) => Arc::new(Picture::new(&terrain.texture, [Wrap::Clamp; 2], false)?),
-            (None, _) => Arc::new(Picture::Uniform([0.0; 4])),
+        let ground = match &scene.terrain {
+            Some(terrain) => Picture::new(&terrain.texture, [Wrap::Clamp; 2]),
+            None => Picture::Uniform([0.0; 4]),
         };
-        let mut paints = vec![Paint { picture: ground, tint: [1.0; 3], emissive: [0.0; 3], has_more: false, sky: None }];
-        for batch in &buffers.batches {
-            paints.push(paint(batch, pictures.of(batch)?));
-        }
+        let mut paints = vec![Paint { picture: Arc::new(ground), tint: [1.0; 3], emissive: [0.0; 3], has_more: false, sky: None }];
+        paints.extend(buffers.batches.iter().map(|batch| paint(batch, pictures.of(batch))));
         let model = |batch: &MeshBatch| Model {
             levels: Piece::of_levels(&batch.shape, &batch.levels),
             one_sided: batch.kind.one_sided,
@@ -283,14 +289,9 @@ fn paint(batch: &MeshBatch, picture: Arc<Picture>) -> Paint {
 struct Pictures(HashMap<(*const Texture, [u8; 2]), Arc<Picture>>);
 
 impl Pictures {
-    fn of(&mut self, batch: &MeshBatch) -> Option<Arc<Picture>> {
+    fn of(&mut self, batch: &MeshBatch) -> Arc<Picture> {
         let look = &batch.look;
         let name = (Arc::as_ptr(&look.texture), look.wrap.map(|wrap| wrap as u8));
-        if let Some(known) = self.0.get(&name) {
-            return Some(known.clone());
-        }
-        let picture = Arc::new(Picture::new(&look.texture, look.wrap, look.nearest)?);
-        self.0.insert(name, picture.clone());
-        Some(picture)
+        self.0.entry(name).or_insert_with(|| Arc::new(Picture::new(&look.texture, look.wrap))).clone()
     }
 }

@@ -48,14 +48,15 @@ const ROWS_A_TASK: usize = 16;
 pub enum ReverseOn {
     /// On the device.
     Device,
-    /// On the host, for frames that it [`serves`] and that are [worth the copy](is_worth_the_copy): the default on a software adapter.
+    /// On the host, for frames that it [`serves`] and whose ideal frame it [draws](crate::ideal::host::draws) itself or that are [worth the copy](is_worth_the_copy): the default on a software
+    /// adapter.
     Best,
     /// On the host, for all frames that it serves.
     Host,
 }
 
 impl ReverseOn {
-    /// Whether the host makes frames of this plan.
+    /// Whether the host makes frames of this plan from ideal frames of the device's.
     #[must_use]
     pub fn is_host(self, plan: &FramePlan) -> bool {
         match self {

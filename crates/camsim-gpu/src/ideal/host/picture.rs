@@ -38,14 +38,18 @@ pub(super) struct Texels {
 /// What reads of pixels have summed up: R G B A of the left texels, then of the right ones.
 pub(super) type Sums = [[f32; 2 * CHANNELS]; LANES];
 
+/// Whether reads of a picture are bilinear, and what is beyond its borders is where a read looks for it.
+pub(super) fn is_read(texture: &Texture, wrap: [Wrap; 2], nearest: bool) -> bool {
+    texture.size_px == [1, 1] || (!nearest && !wrap.contains(&Wrap::Mirror))
+}
+
 impl Picture {
-    /// None for what is not read by bilinear reads, or goes on beyond its borders as a mirror does.
-    pub fn new(texture: &Texture, wrap: [Wrap; 2], nearest: bool) -> Option<Self> {
-        if texture.size_px == [1, 1] {
-            return Some(Self::Uniform(texture.linear_at([0, 0])));
+    /// Of a picture that [is read](is_read).
+    pub fn new(texture: &Texture, wrap: [Wrap; 2]) -> Self {
+        match texture.size_px {
+            [1, 1] => Self::Uniform(texture.linear_at([0, 0])),
+            _ => Self::Texels(Box::new(Texels::new(texture, wrap.map(|wrap| wrap == Wrap::Repeat)))),
         }
-        let is_read = !nearest && !wrap.contains(&Wrap::Mirror);
-        is_read.then(|| Self::Texels(Box::new(Texels::new(texture, wrap.map(|wrap| wrap == Wrap::Repeat)))))
     }
 }
 
