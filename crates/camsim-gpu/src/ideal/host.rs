@@ -91,9 +91,9 @@ struct Model {
     light: Option<Light>,
 }
 
-/// Triangles of a chunk.
+/// Triangles that follow each other in a chunk.
 #[derive(Debug)]
-enum Job {
+enum Part {
     /// These indices of the terrain.
     Terrain(Range<usize>),
     /// A piece of a batch's level, at these of the places in view.
@@ -158,23 +158,24 @@ impl HostScene {
         into.color.resize(CHANNELS * into.stride * height, 0);
         self.shown.resize(into.stride * height, SKY);
         let (seen, drawn) = see_meshes(view.buffers, &key.pose, view.tolerance);
-        let mut jobs = terrain_jobs(view.terrain);
-        self.add_jobs(&drawn, &mut jobs);
+        let mut parts = terrain_parts(view.terrain);
+        self.add_parts(&drawn, &mut parts);
+        let jobs = jobs(parts);
         self.project_terrain(&camera, view.terrain);
         self.collect(&camera, &view, &key.pose, &seen, &jobs);
         self.fill(&camera, view.plan.surface_reads, jobs.len(), into);
     }
 
-    fn add_jobs(&self, drawn: &[Vec<Range<u32>>], jobs: &mut Vec<Job>) {
+    fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(Part, usize)>) {
         for (batch, (model, drawn)) in self.models.iter().zip(drawn).enumerate() {
             for (level, (pieces, places)) in model.levels.iter().zip(drawn).enumerate() {
                 for (piece, of) in pieces.iter().enumerate() {
                     let together = (TRIANGLES_A_CHUNK / of.len().max(1)).max(1);
-                    let places = places.start as usize..places.end as usize;
-                    let end = places.end;
-                    jobs.extend(places.step_by(together).map(|first| {
+                    let (begin, end) = (places.start as usize, places.end as usize);
+                    parts.extend((begin..end).step_by(together).map(|first| {
                         let places = first..(first + together).min(end);
-                        Job::Piece { batch, level, piece, places }
+                        let triangles = of.len() * places.len();
+                        (Part::Piece { batch, level, piece, places }, triangles)
                     }));
                 }
             }
@@ -193,7 +194,7 @@ impl HostScene {
     }
 
     /// Triangles of all jobs, and which bands they are in.
-    fn collect(&mut self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], jobs: &[Job]) {
+    fn collect(&mut self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], jobs: &[Vec<Part>]) {
         let bands = (camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
         if chunks.len() < jobs.len() {
@@ -207,14 +208,14 @@ impl HostScene {
         self.chunks = chunks;
     }
 
-    fn triangles_of(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &Job, chunk: &mut Chunk) {
-        widest!(_vectors => self.triangles(camera, view, pose, seen, job, chunk))
+    fn triangles_of(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &[Part], chunk: &mut Chunk) {
+        widest!(_vectors => job.iter().for_each(|part| self.triangles(camera, view, pose, seen, part, chunk)))
     }
 
     #[inline(always)]
-    fn triangles(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &Job, chunk: &mut Chunk) {
-        match job {
-            Job::Terrain(of) => {
+    fn triangles(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], part: &Part, chunk: &mut Chunk) {
+        match part {
+            Part::Terrain(of) => {
                 let kind = Kind { paint: GROUND, one_sided: false, sky: None };
                 let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
                 for triangle in indices.chunks_exact(3) {
@@ -222,7 +223,7 @@ impl HostScene {
                     chunk.add(camera, [corner(0), corner(1), corner(2)], kind);
                 }
             }
-            Job::Piece { batch, level, piece, places } => {
+            Part::Piece { batch, level, piece, places } => {
                 let model = &self.models[*batch];
                 let paint = *batch + 1;
                 let kind = Kind { paint: paint as u32, one_sided: model.one_sided, sky: self.paints[paint].sky };
@@ -270,10 +271,28 @@ fn fill_band(vectors: impl Vectors, shader: &Shader<'_>, mut band: Band<'_>, col
     }
 }
 
-fn terrain_jobs(terrain: Option<&PlacedMesh>) -> Vec<Job> {
+/// With their numbers of triangles.
+fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(Part, usize)> {
     let count = terrain.map_or(0, |mesh| mesh.indices.len());
     let step = 3 * TRIANGLES_A_CHUNK;
-    (0..count).step_by(step).map(|first| Job::Terrain(first..(first + step).min(count))).collect()
+    (0..count).step_by(step).map(|first| first..(first + step).min(count)).map(|of| (Part::Terrain(of.clone()), of.len() / 3)).collect()
+}
+
+/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many different models there are.
+fn jobs(parts: Vec<(Part, usize)>) -> Vec<Vec<Part>> {
+    let mut jobs: Vec<Vec<Part>> = Vec::new();
+    let mut room = 0;
+    for (part, triangles) in parts {
+        match jobs.last_mut().filter(|_| triangles <= room) {
+            Some(job) => job.push(part),
+            None => {
+                jobs.push(vec![part]);
+                room = TRIANGLES_A_CHUNK;
+            }
+        }
+        room -= triangles.min(room);
+    }
+    jobs
 }
 
 fn paint(batch: &MeshBatch, picture: Arc<Picture>) -> Paint {
