@@ -237,9 +237,13 @@ fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         "| mount, sampling | houses in view | scales | 1/255, predicted | terrain, processor ms a frame | with houses | times | ms a frame | with houses | times |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
-    let alike = [("quality.ideal_scale", ALIKE.to_string()), ("quality.silhouettes", "\"plain\"".to_owned())];
+    let alike = [
+        ("quality.ideal_scale", ALIKE.to_string()),
+        ("quality.silhouettes", "\"plain\"".to_owned()),
+        ("quality.frames_per_ideal", "1".to_owned()),
+    ];
     for pitch_deg in PITCHES_DEG.into_iter().take(if is_measuring { PITCHES_DEG.len() } else { 1 }) {
-        for (way, sets) in [("as planned", &[][..]), ("alike", &alike)] {
+        for (way, sets) in [("as planned", &[][..]), ("alike", &alike[..2]), ("alike, an ideal frame each", &alike)] {
             let pitch = ("camera.mount.angles_deg", format!("[0.0, {pitch_deg:?}, 0.0]"));
             let with_houses = sequence_of("benches/houses.toml", &[&[pitch], sets].concat())?;
             let mut terrain = Sequence::clone(&with_houses);

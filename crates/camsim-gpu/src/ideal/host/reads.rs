@@ -193,7 +193,7 @@ fn add_grid(vectors: impl Vectors, picture: &Texels, places: &Places, pixels: &P
 #[inline(always)]
 pub(super) fn let_through(density: f32, length: &Lanes) -> Lanes {
     /// ln(2)^k / k!.
-    const TERMS: [f32; 7] = [1.0, 0.693_147_2, 0.240_226_5, 0.055_504_11, 0.009_618_129, 0.001_333_356, 0.000_154_035_3];
+    const TERMS: [f32; 7] = [1.0, std::f32::consts::LN_2, 0.240_226_5, 0.055_504_11, 0.009_618_129, 0.001_333_356, 0.000_154_035_3];
     each(|i| {
         let power = higher(-density * std::f32::consts::LOG2_E * length[i], -126.0);
         let whole = (power + 0.5).floor();
@@ -204,4 +204,32 @@ pub(super) fn let_through(density: f32, length: &Lanes) -> Lanes {
         }
         value * f32::from_bits(((lower(whole, 0.0) as i32 + 127) as u32) << 23)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fog_lets_through_what_the_exponential_says() {
+        for (density, step_m) in [(2e-4_f32, 0.37_f32), (0.01, 3.1), (1.0, 0.9)] {
+            for block in 0..400 {
+                let length = each(|i| step_m * (block * LANES + i) as f32);
+                let found = let_through(density, &length);
+                for i in 0..LANES {
+                    let exact = (-f64::from(density) * f64::from(length[i])).exp();
+                    // Of what the exponent itself is rounded to.
+                    let allowed = 3e-7 + 2e-7 * f64::from(density * length[i]);
+                    assert!(
+                        (f64::from(found[i]) - exact).abs() <= allowed * exact.max(1e-37),
+                        "{density} {}: {} {exact}",
+                        length[i],
+                        found[i]
+                    );
+                }
+            }
+        }
+        let nothing_left = let_through(1.0, &each(|i| if i % 2 == 0 { f32::INFINITY } else { 1e30 }));
+        assert!(nothing_left.iter().all(|&left| (0.0..1e-37).contains(&left)));
+    }
 }

@@ -171,9 +171,9 @@ impl Shader<'_> {
                 }
             }
         }
-        for i in 0..LANES {
-            let color = if seen.paint[i] == SKY { [r, g, b] } else { [colors[i][0], colors[i][1], colors[i][2]] };
-            colors[i] = [color[0], color[1], color[2], 1.0];
+        for (color, &paint) in colors.iter_mut().zip(&seen.paint) {
+            let [red, green, blue, _] = *color;
+            *color = if paint == SKY { [r, g, b, 1.0] } else { [red, green, blue, 1.0] };
         }
     }
 }

@@ -68,7 +68,7 @@ fn sheet(cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Corner<2>; 3]
     let pair = |x: u32, y: u32| {
         let [a, b, c, d] = [corner(x, y), corner(x + 1, y), corner(x + 1, y + 1), corner(x, y + 1)];
         // Turning both ways.
-        if (x + y) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, d, b], [d, b, c]] }
+        if (x + y).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, d, b], [d, b, c]] }
     };
     (0..cells * cells).flat_map(|k| pair(k % cells, k / cells)).collect()
 }
