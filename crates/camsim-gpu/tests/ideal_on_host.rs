@@ -118,11 +118,11 @@ fn stripes() -> Arc<Texture> {
 }
 
 /// Balls on the ground, turned and stretched.
-fn balls(light: Option<Light>, change: impl Fn(&mut Mesh)) -> Scene {
+fn balls(count: u32, light: Option<Light>, change: impl Fn(&mut Mesh)) -> Scene {
     let (shape, texture) = (Arc::new(ball(12)), stripes());
     let mut scene = pattern(2000.0);
     scene.light = light;
-    for k in 0..60_u32 {
+    for k in 0..count {
         let vary = |m: f64| (12.9898 * m * f64::from(k + 1)).sin();
         let turn = DMat3::from_quat(DQuat::from_rotation_y(3.0 * vary(1.1)) * DQuat::from_rotation_z(3.0 * vary(1.3)));
         let mut mesh = Mesh::new(Vec::new(), Vec::new(), texture.clone(), 60.0 * DVec3::new(vary(1.7), vary(1.9), 0.0), Wrap::Repeat);
@@ -196,6 +196,7 @@ fn the_host_draws_what_the_device_draws() {
         scenario
     };
     let scale = |scale: f64| move |scenario: &mut Scenario| scenario.quality.ideal_scale = Auto::Value(scale);
+    let finest = |scenario: &mut Scenario| scenario.quality.max_terrain_error_px = 1e-5;
     let light = Light::new(2.5, 0.6, 0.7, 0.3);
     let fog = |mut scene: Scene| {
         scene.fog_visibility_m = Some(900.0);
@@ -218,16 +219,18 @@ fn the_host_draws_what_the_device_draws() {
         ("boxes", from_height(camera(-50.0), 90.0, city(6))),
         ("among boxes", from_height(camera(-10.0), 9.0, city(6))),
         ("fog", from_height(camera(-10.0), 60.0, fog(city(8)))),
-        ("tints", from_height(camera(-50.0), 70.0, balls(None, |_| ()))),
-        ("light", from_height(camera(-50.0), 70.0, balls(Some(light), |_| ()))),
-        ("inner sides in light", from_height(camera(-50.0), 70.0, balls(Some(light), |mesh| mesh.ned_from_shape *= -1.0))),
-        ("one side", from_height(camera(-50.0), 70.0, balls(None, |mesh| mesh.material.one_sided = true))),
+        ("tints", from_height(camera(-50.0), 70.0, balls(60, None, |_| ()))),
+        ("light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |_| ()))),
+        ("inner sides in light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |mesh| mesh.ned_from_shape *= -1.0))),
+        // More than are drawn at once.
+        ("a million triangles", from_height(with(-50.0, &finest), 70.0, balls(2000, Some(light), |_| ()))),
+        ("one side", from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true))),
         (
             "one colour, light of its own",
             from_height(
                 camera(-50.0),
                 70.0,
-                balls(Some(light), |mesh| {
+                balls(60, Some(light), |mesh| {
                     mesh.material.texture = Arc::new(Texture::uniform([200, 90, 40, 255], Encoding::Srgb));
                     mesh.material.emissive = [0.05, 0.1, 0.02];
                 }),

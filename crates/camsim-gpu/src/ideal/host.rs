@@ -43,6 +43,8 @@ use triangles::{BAND_ROWS, Chunk, Kind};
 
 /// Corners of the terrain that a task projects.
 const CORNERS_A_TASK: usize = 4096;
+/// Chunks that are drawn at once: a million triangles at most, which bounds the memory that they take, and their numbers. What has more is drawn in turns, each over the one before.
+const CHUNKS_A_ROUND: usize = 256;
 /// What is on the ground.
 const GROUND: u32 = 0;
 /// Half floats of a texel.
@@ -162,8 +164,12 @@ impl HostScene {
         self.add_parts(&drawn, &mut parts);
         let jobs = jobs(parts);
         self.project_terrain(&camera, view.terrain);
-        self.collect(&camera, &view, &key.pose, &seen, &jobs);
-        self.fill(&camera, view.plan.surface_reads, jobs.len(), into);
+        for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
+            let first = round * CHUNKS_A_ROUND;
+            let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
+            self.collect(&camera, &view, &key.pose, &seen, jobs);
+            self.fill(&camera, view.plan.surface_reads, jobs.len(), round > 0, into);
+        }
     }
 
     fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(Part, usize)>) {
@@ -239,15 +245,17 @@ impl HostScene {
         }
     }
 
-    /// Depth and colour of every pixel.
-    fn fill(&mut self, camera: &Camera, reads: SurfaceReads, chunks: usize, into: &mut DrawnFrame) {
+    /// Depth and colour of every pixel; with `is_over` of those that show something nearer than what is there.
+    fn fill(&mut self, camera: &Camera, reads: SurfaceReads, chunks: usize, is_over: bool, into: &mut DrawnFrame) {
         let stride = into.stride;
-        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads };
+        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, is_over };
         let of_band = stride * BAND_ROWS;
         let bands =
             into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
         bands.enumerate().for_each(|(band, ((depth, color), shown))| {
-            depth.fill(0.0);
+            if !is_over {
+                depth.fill(0.0);
+            }
             shown.fill(SKY);
             let band = Band { first_row: band * BAND_ROWS, stride, depth, shown };
             widest!(vectors => fill_band(vectors, &shader, band, color))

@@ -7,6 +7,8 @@ pub(super) const SUBPIXELS: i32 = 1 << SUBPIXEL_BITS;
 pub(super) const SUBPIXEL_BITS: u32 = 8;
 /// How far from the first pixel a corner may be in the picture, pixels: so far products of two differences are exact in 64 bits.
 const FARTHEST_PX: f32 = 32_768.0;
+/// Where triangles are cut, so that rounding leaves what is cut within.
+const CUT_PX: f32 = 0.99 * FARTHEST_PX;
 
 /// Numbers of the key camera, and of fog.
 #[derive(Clone, Copy, Debug)]
@@ -36,11 +38,16 @@ impl Camera {
     /// Projects a corner.
     #[inline(always)]
     pub fn corner<const N: usize>(&self, in_camera_m: [f32; 3], on_it: [f32; N]) -> Corner<N> {
+        self.corner_within(CUT_PX, in_camera_m, on_it)
+    }
+
+    #[inline(always)]
+    fn corner_within<const N: usize>(&self, most_px: f32, in_camera_m: [f32; 3], on_it: [f32; N]) -> Corner<N> {
         let [x, y, z] = in_camera_m;
         let inverse_z = 1.0 / z;
         let x_px = (x * inverse_z).mul_add(self.focal_px[0], self.principal_px[0]);
         let y_px = (y * inverse_z).mul_add(self.focal_px[1], self.principal_px[1]);
-        let is_within = z >= self.uniforms.near_m && x_px.abs() <= FARTHEST_PX && y_px.abs() <= FARTHEST_PX;
+        let is_within = z >= self.uniforms.near_m && x_px.abs() <= most_px && y_px.abs() <= most_px;
         let on_grid = |px: f32| (if is_within { px * SUBPIXELS as f32 } else { 0.0 }).round_ties_even() as i32;
         let at = [on_grid(x_px), on_grid(y_px)];
         Corner { in_camera_m, on_it, at_px: [x_px, y_px], at, inverse: self.uniforms.near_m * inverse_z, is_within }
@@ -65,9 +72,8 @@ impl Camera {
 
     /// Signed distances from the planes that corners are within.
     fn distances(&self, [x, y, z]: [f32; 3]) -> [f32; 5] {
-        // A little inside, so that rounding leaves what is cut within.
-        let most = [0, 1].map(|k| (0.99 * FARTHEST_PX - self.principal_px[k].abs()) / self.focal_px[k]);
-        [z - self.uniforms.near_m, most[0] * z - x, most[0] * z + x, most[1] * z - y, most[1] * z + y]
+        let side = |sign: f32, k: usize| (CUT_PX + sign * self.principal_px[k]) / self.focal_px[k];
+        [z - self.uniforms.near_m, side(-1.0, 0) * z - x, side(1.0, 0) * z + x, side(-1.0, 1) * z - y, side(1.0, 1) * z + y]
     }
 
     /// What is left of a triangle: a polygon with up to eight corners, in their order.
@@ -102,6 +108,6 @@ impl Camera {
         let mix = |a: f32, b: f32| a + share * (b - a);
         let [x, y, z] = [0, 1, 2].map(|k| mix(a.in_camera_m[k], b.in_camera_m[k]));
         let in_camera_m = [x, y, z.max(self.uniforms.near_m)];
-        self.corner(in_camera_m, std::array::from_fn(|k| mix(a.on_it[k], b.on_it[k])))
+        self.corner_within(FARTHEST_PX, in_camera_m, std::array::from_fn(|k| mix(a.on_it[k], b.on_it[k])))
     }
 }

@@ -35,6 +35,8 @@ pub(super) struct Shader<'a> {
     pub chunks: &'a [Chunk],
     pub paints: &'a [Paint],
     pub reads: SurfaceReads,
+    /// Whether pixels that show nothing keep the colour that they have.
+    pub is_over: bool,
 }
 
 const NO_SURFACE: Surface = Surface { first: [0.0; 2], paint: SKY, u: [0.0; 3], v: [0.0; 3], inverse: [0.0; 3], more: 0, large: SMALL };
@@ -61,7 +63,11 @@ impl Shader<'_> {
     pub fn block(&self, vectors: impl Vectors, [x, y]: [usize; 2], depth: &[f32; LANES], shown: &[u32; LANES], out: &mut [u16]) {
         let mut colors = [[0.0; 4]; LANES];
         let [r, g, b, _] = self.camera.uniforms.sky;
-        if shown.iter().all(|&shown| shown == SKY) {
+        let is_empty = shown.iter().all(|&shown| shown == SKY);
+        if is_empty && self.is_over {
+            return;
+        }
+        if is_empty {
             colors = [[r, g, b, 1.0]; LANES];
         } else {
             let seen = self.seen([x, y], depth, shown);
@@ -77,9 +83,14 @@ impl Shader<'_> {
             }
             self.fog([x, y], &seen, &mut colors);
         }
-        for (pixels, out) in colors.chunks_exact(2).zip(out.chunks_exact_mut(8)) {
+        for ((pixels, shown), out) in colors.chunks_exact(2).zip(shown.chunks_exact(2)).zip(out.chunks_exact_mut(8)) {
             let [[r0, g0, b0, a0], [r1, g1, b1, a1]] = [pixels[0], pixels[1]];
-            out.copy_from_slice(&vectors.halves([r0, g0, b0, a0, r1, g1, b1, a1]));
+            let halves = vectors.halves([r0, g0, b0, a0, r1, g1, b1, a1]);
+            let from = if self.is_over && shown[0] == SKY { 4 } else { 0 };
+            let to = if self.is_over && shown[1] == SKY { 4 } else { 8 };
+            if from < to {
+                out[from..to].copy_from_slice(&halves[from..to]);
+            }
         }
     }
 

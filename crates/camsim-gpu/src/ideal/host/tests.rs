@@ -15,6 +15,10 @@ const SIZE_PX: [u32; 2] = [200, 150];
 const KIND: Kind = Kind { paint: 0, one_sided: false, sky: None };
 
 fn camera() -> Camera {
+    camera_at([99.5, 74.5])
+}
+
+fn camera_at(principal_px: [f32; 2]) -> Camera {
     let uniforms = IdealCamera {
         camera_from_ned_x: [1.0, 0.0, 0.0, 0.0],
         camera_from_ned_y: [0.0, 1.0, 0.0, 0.0],
@@ -22,7 +26,7 @@ fn camera() -> Camera {
         near_m: 0.05,
         ..IdealCamera::default()
     };
-    Camera { uniforms, focal_px: [100.0, 100.0], principal_px: [99.5, 74.5], size_px: SIZE_PX }
+    Camera { uniforms, focal_px: [100.0, 100.0], principal_px, size_px: SIZE_PX }
 }
 
 fn random(k: u32) -> [f32; 4] {
@@ -31,14 +35,17 @@ fn random(k: u32) -> [f32; 4] {
 
 /// How often each pixel is covered by triangles that do not hide each other, and what they are drawn as.
 fn covered(triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
-    let camera = camera();
+    covered_by(&camera(), triangles, kind)
+}
+
+fn covered_by(camera: &Camera, triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
     let [width, height] = SIZE_PX.map(|side| side as usize);
     let stride = width + BEYOND;
     let mut counts = vec![0; width * height];
     let (mut chunk, mut kinds) = (Chunk::default(), [0; 2]);
     for [a, b, c] in triangles {
         chunk.clear();
-        chunk.add(&camera, [a, b, c], kind);
+        chunk.add(camera, [a, b, c], kind);
         chunk.sort(height.div_ceil(BAND_ROWS));
         kinds = [kinds[0] + chunk.covers.len() - chunk.large.len(), kinds[1] + chunk.large.len()];
         for first_row in (0..height).step_by(BAND_ROWS).filter(|row| !chunk.of_band(row / BAND_ROWS).is_empty()) {
@@ -58,7 +65,10 @@ fn covered(triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
 
 /// A plane of so many cells, each a pair of triangles, whose inner corners are shaken by a fifth of a cell, seen through `place` from places in it, 0..=1.
 fn sheet(cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Corner<2>; 3]> {
-    let camera = camera();
+    sheet_by(&camera(), cells, place)
+}
+
+fn sheet_by(camera: &Camera, cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -> Vec<[Corner<2>; 3]> {
     let corner = |x: u32, y: u32| {
         let [across, down, ..] = random(x * 1000 + y);
         let shake = |side: u32, by: f32| if side == 0 || side == cells { 0.0 } else { 0.4 * (by - 0.5) };
@@ -100,6 +110,19 @@ fn pixels_are_covered_once() {
     assert!(above.iter().all(|&count| count == 0), "nothing above the horizon");
     // The floor ends 200 m away, one pixel below the horizon; its nearest row is 2.7 m away.
     assert!(below[2 * SIZE_PX[0] as usize..].iter().all(|&count| count == 1), "all of the floor, once");
+}
+
+#[test]
+fn pictures_far_beside_the_axis_are_covered_once() {
+    for principal_px in [[17_000.0, 74.5], [-20_000.0, 74.5], [99.5, 31_000.0], [-40_000.0, -40_000.0]] {
+        let camera = camera_at(principal_px);
+        for (cells, side_m) in [(2, 30_000.0), (30, 20_000.0)] {
+            let wall = |[x, y]: [f32; 2]| [side_m * (x - 0.5), side_m * (y - 0.5), 10.0];
+            let (counts, _) = covered_by(&camera, &sheet_by(&camera, cells, wall), KIND);
+            let other = counts.iter().filter(|&&count| count != 1).count();
+            assert_eq!(other, 0, "{principal_px:?}, {cells} cells: of {} pixels", counts.len());
+        }
+    }
 }
 
 #[test]
