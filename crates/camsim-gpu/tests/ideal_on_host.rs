@@ -44,7 +44,7 @@ fn frame(engine: &Engine, sequence: &Arc<Sequence>, frame_number: u64, channels:
 }
 
 /// Share of the pixels that one frame shows otherwise than the other, by more than 8/255 or another surface: where rounding decides at borders of triangles. And what the others' colours are apart,
-/// RMS, 1/255, and their inverse depths, largest, relative.
+/// RMS, 1/255, and their inverse depths, RMS, relative.
 #[derive(Debug)]
 struct Apart {
     otherwise: f64,
@@ -57,7 +57,7 @@ fn apart(host: &IdealImages, device: &IdealImages) -> Apart {
     let pixels = host.2.len();
     let [width, height] = host.0.size_px.map(|side| side as usize);
     assert_eq!((pixels, host.1.len()), (width * height, 4 * width * height));
-    let (mut otherwise, mut squares, mut inverse_depth) = (0, 0.0, 0.0_f64);
+    let (mut otherwise, mut squares, mut of_depths) = (0, 0.0, 0.0);
     for ((host_rgba, device_rgba), (&a, &b)) in host.1.chunks_exact(4).zip(device.1.chunks_exact(4)).zip(host.2.iter().zip(&device.2)) {
         assert_eq!(host_rgba[3], device_rgba[3], "no marks");
         let dn = [0, 1, 2].map(|k| 255.0 * f64::from(host_rgba[k] - device_rgba[k]));
@@ -66,10 +66,14 @@ fn apart(host: &IdealImages, device: &IdealImages) -> Apart {
             otherwise += 1;
             continue;
         }
-        inverse_depth = inverse_depth.max(depths);
+        of_depths += depths * depths;
         squares += dn.iter().map(|dn| dn * dn).sum::<f64>();
     }
-    Apart { otherwise: f64::from(otherwise) / pixels as f64, rms_dn: (squares / (3 * pixels) as f64).sqrt(), inverse_depth }
+    Apart {
+        otherwise: f64::from(otherwise) / pixels as f64,
+        rms_dn: (squares / (3 * pixels) as f64).sqrt(),
+        inverse_depth: (of_depths / pixels as f64).sqrt(),
+    }
 }
 
 fn camera(pitch_deg: f64) -> Scenario {
@@ -174,12 +178,14 @@ fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, fram
     eprintln!("{name}: {:?}, {found:?}, {:.0} % no sky", by_host.plan.surface_reads, 100.0 * seen);
     assert!(seen > 0.3, "{name}: something to be seen");
     match width_m {
-        None => assert!(found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < 1e-3, "{name}: {found:?}"),
+        // Among boxes 5e-5 and 0.12/255 were found, half of them what half floats are cut off to there; depth is floats' rounding, 8e-7 at most.
+        None => assert!(found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < 3e-6, "{name}: {found:?}"),
         Some(width_m) => {
             let [of_host, of_device] = [&host, &device].map(|images| from_exact(images, &by_host.plan, width_m));
             eprintln!("  from exact: host {of_host:?}, device {of_device:?}");
             assert!(of_host[0] < 2e-6, "{name}: inverse depth {:.1e}", of_host[0]);
-            assert!(of_host[1] < of_device[1], "{name}: {:.3}/255, {:.3} by the device", of_host[1], of_device[1]);
+            // Nearer by 2 % at least with the driver that this was written beside; others may be as near.
+            assert!(of_host[1] < 1.02 * of_device[1], "{name}: {:.3}/255, {:.3} by the device", of_host[1], of_device[1]);
         }
     }
     assert_eq!(by_host.lod, by_device.lod, "{name}");

@@ -35,8 +35,8 @@ struct Side<T> {
     from: T,
 }
 
-#[inline(always)]
 /// A side from a corner to the next, by pixels from the triangle's first; what is exactly on it is within if it is an upper or a left one.
+#[inline(always)]
 fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output = T>>(a: [i32; 2], b: [i32; 2]) -> Side<T> {
     let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
     let is_kept = dy < 0 || (dy == 0 && dx > 0);
@@ -86,8 +86,8 @@ impl Band<'_> {
                 let from = [begins[0] + sides[0].across * x, begins[1] + sides[1].across * x, begins[2] + sides[2].across * x];
                 let inverse = cover.inverse[1].mul_add(x as f32, begin_inverse);
                 let place = row + x as usize;
-                let depth: &mut [f32; SIDE_BY_SIDE] = slots(self.depth, place);
-                let shown: &mut [u32; SIDE_BY_SIDE] = slots(self.shown, place);
+                // Rows have more numbers than pixels, so that there are enough.
+                let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else { return };
                 for i in 0..SIDE_BY_SIDE {
                     // Bits of what is less than 0 anywhere.
                     let beyond = (from[0] + adds[0][i]) | (from[1] + adds[1][i]) | (from[2] + adds[2][i]) | (last - x - i as i32);
@@ -133,9 +133,8 @@ impl Band<'_> {
     }
 }
 
-/// Numbers side by side. Rows have [`BEYOND`] more of them than pixels, so that there are enough.
+/// Numbers side by side.
 #[inline(always)]
-fn slots<T, const N: usize>(values: &mut [T], place: usize) -> &mut [T; N] {
-    #[expect(clippy::unwrap_used, reason = "a slice of N has an array of N")]
-    (&mut values[place..place + N]).try_into().unwrap()
+fn slots<T>(values: &mut [T], place: usize) -> Option<&mut [T; SIDE_BY_SIDE]> {
+    values.get_mut(place..)?.first_chunk_mut()
 }

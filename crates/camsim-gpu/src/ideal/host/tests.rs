@@ -169,6 +169,41 @@ fn small_triangles_cover_what_64_bits_say() {
 }
 
 #[test]
+fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
+    let camera = camera();
+    let [width, height] = SIZE_PX.map(|side| side as usize);
+    let stride = width + BEYOND;
+    let (mut pixels, mut large) = (0, 0);
+    for k in 0..4000 {
+        let [x, y, side, turn] = random(k);
+        // Up to 150 px long, and from next to nothing to a pixel wide.
+        let (long, wide) = (0.1 + 15.0 * side, 0.1 * turn.powi(4));
+        let (sin, cos) = (40.0 * turn).sin_cos();
+        let corner = |along: f32, across: f32, z: f32| {
+            let at = [20.0 * (x - 0.5) + along * cos - across * sin, 15.0 * (y - 0.5) + along * sin + across * cos];
+            camera.corner([at[0] * z / 10.0, at[1] * z / 10.0, z], [0.0; 2])
+        };
+        let [a, b, c] = [corner(0.0, 0.0, 10.0), corner(long, 0.0, 14.0), corner(0.5 * long, wide, 11.0)];
+        let mut chunk = Chunk::default();
+        chunk.add(&camera, [&a, &b, &c], KIND);
+        chunk.sort(height.div_ceil(BAND_ROWS));
+        large += chunk.large.len();
+        let (nearest, farthest) = (0.05 / 10.0, 0.05 / 14.0);
+        // A pixel is at most a step of the grid beyond where the corners are, of eight that the triangle is wide at least.
+        let allowed = 0.25 * (nearest - farthest);
+        for first_row in (0..height).step_by(BAND_ROWS) {
+            let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
+            Band { first_row, stride, depth: &mut depth, shown: &mut shown }.draw(&chunk, 0);
+            for inverse in depth.into_iter().zip(shown).filter(|&(_, shown)| shown != SKY).map(|(inverse, _)| inverse) {
+                pixels += 1;
+                assert!((farthest - allowed..=nearest + allowed).contains(&inverse), "{k}: {inverse}");
+            }
+        }
+    }
+    assert!(pixels > 1000 && large > 100, "{pixels} pixels, {large} large");
+}
+
+#[test]
 fn numbers_that_are_none_draw_nothing() {
     let camera = camera();
     let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e38, 1e-42, 0.0];

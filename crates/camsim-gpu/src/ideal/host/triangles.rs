@@ -6,6 +6,8 @@ use super::{
 };
 use crate::host::lanes::{higher, lower};
 
+/// Triangles less wide than this, steps of the grid, have planes by their corners on the grid.
+const THIN_STEPS: i64 = 8;
 /// Rows of the picture that are drawn together.
 pub(super) const BAND_ROWS: usize = 32;
 /// Numbers on a triangle besides texture coordinates, where it has any: a tint, and what light needs of the normal (towards the sun, down).
@@ -171,21 +173,19 @@ impl Chunk {
         let at = [place(a), place(b), place(c)];
         let is_near = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
         let is_small = is_near(at[0]) & is_near(at[1]) & is_near(at[2]);
-        // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step of the grid is much towards a horizon.
+        // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step of the grid is much towards a horizon. Not where it is next to as much as the
+        // triangle is wide: what is on that would go far beyond what its corners have.
+        let reach = |to: &Corner<N>| i64::from((to.at[0] - a.at[0]).abs() + (to.at[1] - a.at[1]).abs());
+        let is_thin = area2.abs() < THIN_STEPS * (reach(b) + reach(c));
         const PX: f32 = 1.0 / SUBPIXELS as f32;
         let first_px = [first[0] as f32, first[1] as f32];
-        let off = |of: &Corner<N>, from: [f32; 2]| [of.at_px[0] - from[0], of.at_px[1] - from[1]];
-        let (mut px, mut to_b, mut to_c) = (off(a, first_px), off(b, a.at_px), off(c, a.at_px));
-        let area2_px = area2.abs() as f32 * (PX * PX);
-        let mut area2_off = to_b[0] * to_c[1] - to_b[1] * to_c[0];
-        // Unless there is little left of it between them.
-        if !(0.5 * area2_px..2.0 * area2_px).contains(&area2_off) {
-            let on_grid = |to: [i32; 2], from: [i32; 2]| [(to[0] - from[0]) as f32 * PX, (to[1] - from[1]) as f32 * PX];
-            (px, to_b, to_c) = (on_grid(at[0], [0; 2]), on_grid(at[1], at[0]), on_grid(at[2], at[0]));
-            area2_off = area2_px;
-        }
-        let large = if is_small { SMALL } else { self.add_large(camera, [a, b, c], first_px) };
-        let per_area = 1.0 / area2_off;
+        let [px, b_px, c_px] = match is_thin {
+            true => at.map(|[x, y]| [x as f32 * PX, y as f32 * PX]),
+            false => [a, b, c].map(|corner| [corner.at_px[0] - first_px[0], corner.at_px[1] - first_px[1]]),
+        };
+        let large = if is_small { SMALL } else { self.add_large(camera, [a, b, c], is_thin.then_some(&at), first_px) };
+        let (to_b, to_c) = ([b_px[0] - px[0], b_px[1] - px[1]], [c_px[0] - px[0], c_px[1] - px[1]]);
+        let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
         let plane = |of_a: f32, of_b: f32, of_c: f32| -> Plane {
             let (of_b, of_c) = (of_b - of_a, of_c - of_a);
             let across = (of_b * to_c[1] - of_c * to_b[1]) * per_area;
@@ -233,11 +233,23 @@ impl Chunk {
         self.more.len() as u32 - 1
     }
 
+    /// Keeps the planes of a large triangle, by its corners' places on the grid if those are given; gives their place.
     #[cold]
-    fn add_large<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], first_px: [f32; 2]) -> u32 {
-        let [a, b, c] = corners.map(|corner| camera.place_px(corner));
-        let px = [0, 1].map(|k| a[k] - f64::from(first_px[k]));
-        let [to_b, to_c] = [b, c].map(|to| [to[0] - a[0], to[1] - a[1]]);
+    fn add_large<const N: usize>(
+        &mut self,
+        camera: &Camera,
+        corners: [&Corner<N>; 3],
+        on_grid: Option<&[[i32; 2]; 3]>,
+        first_px: [f32; 2],
+    ) -> u32 {
+        let [px, b, c] = match on_grid {
+            Some(at) => at.map(|at| at.map(|at| f64::from(at) / f64::from(SUBPIXELS))),
+            None => corners.map(|corner| {
+                let [x, y] = camera.place_px(corner);
+                [x - f64::from(first_px[0]), y - f64::from(first_px[1])]
+            }),
+        };
+        let [to_b, to_c] = [b, c].map(|to| [to[0] - px[0], to[1] - px[1]]);
         let per_area = 1.0 / (to_b[0] * to_c[1] - to_b[1] * to_c[0]);
         let plane = |of: [f64; 3]| {
             let (of_b, of_c) = (of[1] - of[0], of[2] - of[0]);
