@@ -280,7 +280,7 @@ const COST_SAMPLES: [u32; 2] = [3, 16];
 /// Frames of each, one by one so that nothing overlaps; the first compiles.
 const COST_FRAMES: u64 = 4;
 
-/// What the plan takes the ideal and the reverse pass to cost beside what they take, by the device's clock: many ways of sampling, silhouettes left as they
+/// What the plan takes the ideal and the reverse pass to cost beside what they take, by the clock of the device or of the host, whichever runs them: many ways of sampling, silhouettes left as they
 /// are. Only where its milliseconds come from the ratio should be near 1; anywhere ratios should be alike.
 fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     let mut sequences = Vec::new();
@@ -317,7 +317,10 @@ fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         });
         println!("| {name} | {} | {} |", taken[0].len(), cells.join(" | "));
     }
-    println!("\ndevice time of each way: median of {} frames, rendered one by one; medians and quartiles over the ways", COST_FRAMES - 1);
+    println!(
+        "\ntime of each way, on the device or the host: median of {} frames, rendered one by one; medians and quartiles over the ways",
+        COST_FRAMES - 1
+    );
     Ok(())
 }
 
@@ -334,8 +337,9 @@ fn pass_times(engine: &Engine, sequence: Arc<Sequence>, first: u64) -> Outcome<O
         session.render::<Infallible>([(first + k) % frames], &mut |finished| {
             let plan = &finished.plan;
             price = [plan.ideal_price_ms, plan.price_ms - plan.ideal_price_ms];
-            for (times, name) in taken.iter_mut().zip(["ideal", "reverse"]).filter(|_| k > 0) {
-                times.extend(finished.times.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms));
+            let by_host = [finished.times.ideal_ms, finished.times.reverse_ms];
+            for ((times, name), by_host) in taken.iter_mut().zip(["ideal", "reverse"]).zip(by_host).filter(|_| k > 0) {
+                times.extend(finished.times.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).chain(by_host));
             }
             Ok(())
         })?;

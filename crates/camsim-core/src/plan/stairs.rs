@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::{
     BlurStage,
     levels::{Sampling, sample_count},
-    transfer::{Over, Path, read_wave, sinc},
+    transfer::{Over, Path, read_waves, sinc},
 };
 use crate::temporal::{Footprint, TapStage};
 
@@ -32,6 +32,7 @@ const STEP_OF_WAVES: [f64; 3] = [0.618_033_988_749_895, 0.754_877_666_246_693, 0
 /// Direction of the path for the first wave, a quarter of a turn further for each next one: each cell of a grid is read at an instant of its own, so that its
 /// directions are not alike.
 const ALONG: f64 = 0.5;
+const DIRECTIONS: u32 = 4;
 /// Steps of a doubling that widths are told apart by, and paths and samples.
 const STEPS: f64 = 8.0;
 const STEPS_OF_PATH: f64 = 4.0;
@@ -149,19 +150,25 @@ fn fewer(samples: u32) -> u32 {
 fn worked_out(&Reading { width_px, taps, exposure }: &Reading) -> f64 {
     let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
     let wave = |i: u32| {
-        let along = DVec2::from_angle(ALONG + 0.5 * PI * f64::from(i % 4));
-        let path = exposure.map(|(path_px, samples)| Path { along: path_px * along, samples });
         let i = f64::from(i) + 0.5;
         let [direction, beside_x, beside_y] = STEP_OF_WAVES.map(|step| (i * step).fract());
         let length = LOWEST * (OCTAVES * i / f64::from(WAVES)).exp2();
-        // The other half-plane is its mirror image.
-        let weight = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
-        let f = length * DVec2::from_angle(PI * direction);
-        let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
-        let found = read_wave(f, &area, path.map_or(Over::Instant, Over::Samples), DVec2::new(beside_x, beside_y));
-        weight / (4.0 * (PI * length).powi(3)) * (found - DVec2::new(exact, 0.0)).length_squared()
+        (length, [length * DVec2::from_angle(PI * direction), DVec2::new(beside_x, beside_y)])
     };
-    let square: f64 = (0..WAVES).map(wave).sum();
+    let of_direction = |direction: u32| -> f64 {
+        let along = DVec2::from_angle(ALONG + 0.5 * PI * f64::from(direction));
+        let path = exposure.map(|(path_px, samples)| Path { along: path_px * along, samples });
+        let (lengths, waves): (Vec<f64>, Vec<[DVec2; 2]>) = (direction..WAVES).step_by(DIRECTIONS as usize).map(wave).unzip();
+        let found = read_waves(&waves, &area, path.map_or(Over::Instant, Over::Samples));
+        let square = |((&length, &[f, _]), found): ((&f64, &[DVec2; 2]), DVec2)| {
+            // The other half-plane is its mirror image.
+            let weight = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
+            let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
+            weight / (4.0 * (PI * length).powi(3)) * (found - DVec2::new(exact, 0.0)).length_squared()
+        };
+        lengths.iter().zip(&waves).zip(found).map(square).sum()
+    };
+    let square: f64 = (0..DIRECTIONS).map(of_direction).sum();
     // A border of a length in output pixels is as many times longer in ideal pixels as those are smaller, their area by the square of it.
     square / width_px
 }

@@ -11,21 +11,23 @@
 //! | grid of reads, samples on a path | `sin(pi n x) / (n sin(pi x))` of the step along each |
 //! | exact: mean over the pixel's sides and the path | `sinc` of each |
 
+#[cfg(test)]
+mod exact;
 mod lanes;
 mod waves;
 
 use std::f64::consts::PI;
 
-use glam::DVec2;
+use glam::{DVec2, Vec4};
 
 use super::grain::mean_of;
-use crate::{scenario::MAX_FOOTPRINT_TAPS, temporal::Footprint};
+use crate::temporal::Footprint;
+use lanes::{Frequencies4, Sampler};
 pub(super) use waves::{Waves, error2};
 
 /// Of a wave less than this is left out: nine together move the error of a pixel by less than a hundredth of the wave.
 const UNSEEN: f64 = 1e-3;
-/// Taps along a side that the plan asks for by itself, at most.
-const FEW_TAPS: u32 = 4;
+
 pub(super) fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-6 { 1.0 } else { sin_pi(x) / (PI * x) }
 }
@@ -88,60 +90,6 @@ pub(super) struct Path {
 /// A complex number: what is left of a wave, and how far it is shifted.
 pub(super) type Wave = DVec2;
 
-/// The samples of an exposure, each at its place on the path and at one of the taps in turn. Those of one tap stand evenly on the path: their
-/// sum is a geometric one.
-fn sampled(area: &Footprint, path: Path, f: DVec2) -> Wave {
-    let Path { along, samples } = path;
-    let (taps, cycles) = (area.taps[0] * area.taps[1], along.dot(f));
-    if taps == 1 || samples > 8 * taps {
-        return Wave::new(grid(area, f) * evenly(samples, cycles), 0.0);
-    }
-    if area.taps.iter().all(|&side| side <= FEW_TAPS) {
-        in_turns::<{ FEW_TAPS as usize }>(area, samples, cycles, f)
-    } else {
-        in_turns::<{ MAX_FOOTPRINT_TAPS as usize }>(area, samples, cycles, f)
-    }
-}
-
-/// A wave that is then turned by a step.
-fn after(wave: &mut Wave, step: Wave) -> Wave {
-    let next = wave.rotate(step);
-    std::mem::replace(wave, next)
-}
-
-/// The same with at most `SIDE` taps along each side: of each tap its samples' mean, turned by where the middle of them is on the path and by where the tap is
-/// in the grid. From tap to tap both turn by as much again.
-fn in_turns<const SIDE: usize>(area: &Footprint, samples: u32, cycles: f64, f: DVec2) -> Wave {
-    let line = |side: DVec2, taps: u32| -> [Wave; SIDE] {
-        let turns = side.dot(f) / f64::from(taps);
-        let (mut at, step) = (turned_by(0.5 * turns * (1.0 - f64::from(taps))), turned_by(turns));
-        std::array::from_fn(|_| after(&mut at, step))
-    };
-    let (columns, rows) = (line(area.dx, area.taps[0]), line(area.dy, area.taps[1]));
-    let taps = area.taps[0] * area.taps[1];
-    let (step, a_sample) = (f64::from(taps) / f64::from(samples), cycles / f64::from(samples));
-    let to_next = turned_by(a_sample);
-    // The first taps have one sample more than the others.
-    let most = samples.div_ceil(taps);
-    let with_most = samples - (most - 1) * taps;
-    let of_taps = |first: u32, end: u32, count: u32| {
-        let middle = 0.5 - 0.5 * f64::from(samples) + f64::from(first) + 0.5 * f64::from(taps) * f64::from(count - 1);
-        let mut on_path = f64::from(count) * mean_of(count, step * cycles) * turned_by(middle * a_sample);
-        let of_tap = |tap: u32| {
-            let [column, row] = area.cell(tap).map(|k| k as usize);
-            after(&mut on_path, to_next).rotate(columns[column].rotate(rows[row]))
-        };
-        (first..end).map(of_tap).sum::<Wave>()
-    };
-    let of_others = if most > 1 { of_taps(with_most, taps, most - 1) } else { Wave::ZERO };
-    (of_taps(0, with_most, most) + of_others) / f64::from(samples)
-}
-
-/// The grid of taps.
-fn grid(area: &Footprint, f: DVec2) -> f64 {
-    evenly(area.taps[0], area.dx.dot(f)) * evenly(area.taps[1], area.dy.dot(f))
-}
-
 /// One axis of a wave that looks like another on the grid of ideal pixels.
 struct Alias {
     seen: f64,
@@ -169,23 +117,44 @@ pub(super) enum Over {
     Samples(Path),
 }
 
-/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost.
-pub(super) fn read_wave(f: DVec2, area: &Footprint, over: Over, beside_px: DVec2) -> Wave {
+/// A read of a wave or of one that looks like it on the grid of ideal pixels.
+struct Read {
+    /// Which of the waves.
+    of: usize,
+    /// Cycles an ideal pixel.
+    f: DVec2,
+    /// What one read leaves.
+    leaves: Wave,
+}
+
+/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far as they count.
+fn reads_of(of: usize, f: DVec2, area: &Footprint, beside_px: DVec2) -> impl Iterator<Item = Read> {
     let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
-    let seen = x.iter().flat_map(|x| y.iter().map(move |y| (x, y)));
-    let of = |(x, y): (&Alias, &Alias)| {
-        let turned = x.read.rotate(y.read);
-        if turned.length_squared() < UNSEEN * UNSEEN {
-            return Wave::ZERO;
+    let both = (0..9).map(move |i| {
+        let (x, y) = (&x[i / 3], &y[i % 3]);
+        Read { of, f: DVec2::new(x.seen, y.seen), leaves: x.read.rotate(y.read) }
+    });
+    both.filter(|read| read.leaves.length_squared() >= UNSEEN * UNSEEN)
+}
+
+/// What reading the ideal frame leaves of waves, each with the place between ideal pixels where it is read.
+pub(super) fn read_waves(waves: &[[DVec2; 2]], area: &Footprint, over: Over) -> Vec<Wave> {
+    let reads: Vec<Read> = waves.iter().enumerate().flat_map(|(of, &[f, beside_px])| reads_of(of, f, area, beside_px)).collect();
+    sum_of(&reads, waves.len(), area, over)
+}
+
+/// What is left of so many waves, four reads at a time.
+fn sum_of(reads: &[Read], count: usize, area: &Footprint, over: Over) -> Vec<Wave> {
+    let sampler = Sampler::new(area, over);
+    let mut left = vec![Wave::ZERO; count];
+    for four in reads.chunks(4) {
+        let of_four = |value: &dyn Fn(&Read) -> f64| Vec4::from_array(std::array::from_fn(|i| four.get(i).map_or(0.0, value) as f32));
+        let sampled = sampler.leaves(Frequencies4 { x: of_four(&|read| read.f.x), y: of_four(&|read| read.f.y) });
+        for (i, read) in four.iter().enumerate() {
+            left[read.of] += read.leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
         }
-        let seen = DVec2::new(x.seen, y.seen);
-        match over {
-            Over::Instant => turned * grid(area, seen),
-            Over::All(along) => turned * grid(area, seen) * sinc(along.dot(seen)),
-            Over::Samples(path) => turned.rotate(sampled(area, path, seen)),
-        }
-    };
-    seen.map(of).sum()
+    }
+    left
 }
 
 #[cfg(test)]
@@ -207,27 +176,6 @@ mod tests {
             (area.tap_color(&ColorImage { size_px, rgba: &rgba }, px, 0).x - exact * wave(px, phase)).powi(2)
         });
         squares.sum::<f64>() / f64::from(turns)
-    }
-
-    #[test]
-    fn samples_in_turns_are_the_sum_of_them_all() {
-        for (taps, samples) in
-            [([4, 4], 7), ([4, 4], 16), ([4, 4], 41), ([3, 2], 5), ([2, 4], 64), ([7, 3], 30), ([1, 5], 3), ([64, 64], 9000)]
-        {
-            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, spline: None };
-            let along = DVec2::new(5.3, -2.1);
-            for f in [DVec2::new(0.11, 0.05), DVec2::new(-0.7, 0.3), DVec2::new(1.4, 0.9)] {
-                let wave = |k: u32| {
-                    let share = (f64::from(k) + 0.5) / f64::from(samples) - 0.5;
-                    DVec2::from_angle(2.0 * PI * (area.offset_px(k) + share * along).dot(f))
-                };
-                let all = (0..samples).map(wave).sum::<DVec2>() / f64::from(samples);
-                let found = sampled(&area, Path { along, samples }, f);
-                // The short sine is off by 3e-11, and the same way in every turn.
-                let bound = 1e-10 * f64::from(1 + taps[0] * taps[1]);
-                assert!(found.distance(all) < bound, "{taps:?} {samples} {f}: {found} {all}");
-            }
-        }
     }
 
     #[test]
@@ -259,18 +207,5 @@ mod tests {
             assert!((sin_pi(x) - (PI * x).sin()).abs() < 3e-11, "{x}: {}", sin_pi(x) - (PI * x).sin());
         }
         assert!((sin_pi(1e6 + 0.25) - 0.5_f64.sqrt()).abs() < 3e-11);
-    }
-
-    #[test]
-    fn samples_of_each_tap_add_up() {
-        let area = Footprint { dx: DVec2::new(2.3, 0.4), dy: DVec2::new(-0.2, 1.9), taps: [3, 2], spline: None };
-        for samples in [1, 4, 6, 17, 48] {
-            let path = Path { along: DVec2::new(7.0, -3.0), samples };
-            for f in [DVec2::new(0.1, 0.03), DVec2::new(-0.4, 0.3), DVec2::ZERO] {
-                let at = |i: u32| area.offset_px(i) + path.along * ((f64::from(i) + 0.5) / f64::from(samples) - 0.5);
-                let each: Wave = (0..samples).map(|i| Wave::from_angle(2.0 * PI * f.dot(at(i)))).sum::<Wave>() / f64::from(samples);
-                assert!(sampled(&area, path, f).distance(each) < 1e-9, "{samples} samples, {f}");
-            }
-        }
     }
 }

@@ -170,7 +170,9 @@ impl<'a> Sampler<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use glam::DVec2;
+
+    use super::{super::exact::sampled, *};
 
     #[test]
     fn the_short_sine_is_a_sine() {
@@ -179,6 +181,23 @@ mod tests {
             let short = sin_pi(Vec4::splat(x as f32)).x;
             let exact = (std::f64::consts::PI * f64::from(x as f32)).sin();
             assert!((f64::from(short) - exact).abs() < 4e-7, "{x}: {short} {exact}");
+        }
+    }
+
+    #[test]
+    fn samples_in_turns_are_the_sum_of_them_all() {
+        for (taps, samples) in
+            [([4, 4], 7), ([4, 4], 16), ([4, 4], 41), ([3, 2], 5), ([2, 4], 64), ([7, 3], 30), ([1, 5], 3), ([3, 2], 48), ([64, 64], 9000)]
+        {
+            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, spline: None };
+            let over = Over::Samples(Path { along: DVec2::new(5.3, -2.1), samples });
+            for f in [DVec2::new(0.11, 0.05), DVec2::new(-0.7, 0.3), DVec2::new(1.4, 0.9), DVec2::ZERO] {
+                let found = Sampler::new(&area, over).leaves(Frequencies4 { x: Vec4::splat(f.x as f32), y: Vec4::splat(f.y as f32) });
+                let (found, all) = (DVec2::new(f64::from(found.re.z), f64::from(found.im.z)), sampled(&area, over, f));
+                // Each turn adds its rounding.
+                let bound = 2e-6 + 1e-7 * f64::from(taps[0] * taps[1]);
+                assert!(found.distance(all) < bound, "{taps:?} {samples} {f}: {found} {all}");
+            }
         }
     }
 

@@ -6,13 +6,9 @@ use std::{
     sync::LazyLock,
 };
 
-use glam::{DMat2, DVec2, Vec4};
+use glam::{DMat2, DVec2};
 
-use super::{
-    Footprint, Over, UNSEEN, Wave, catmull_rom,
-    lanes::{Frequencies4, Sampler},
-    sinc, turned_by,
-};
+use super::{Footprint, Over, Read, UNSEEN, Wave, catmull_rom, sinc, sum_of, turned_by};
 use crate::plan::{grain::Spectrum, surface_filter::SurfaceFilter};
 
 /// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
@@ -89,15 +85,6 @@ struct Seen {
     exact: f64,
 }
 
-/// A read of one wave or of what looks like it.
-struct Read {
-    /// Which of the waves.
-    of: usize,
-    /// Cycles an ideal pixel.
-    f: DVec2,
-    leaves: Wave,
-}
-
 impl Waves {
     /// `sides`: of the pixel, ideal px; `along`: the path over the exposure, if that shows.
     pub fn new(spectrum: &Spectrum, texel_from_ideal: DMat2, sides: DMat2, along: Option<DVec2>) -> Self {
@@ -122,17 +109,7 @@ impl Waves {
 
     /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
     pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
-        let reads = self.reads(area, beside_px);
-        let sampler = Sampler::new(area, over);
-        let mut left = vec![Wave::ZERO; self.0.len()];
-        for four in reads.chunks(4) {
-            let of_four = |value: &dyn Fn(&Read) -> f64| Vec4::from_array(std::array::from_fn(|i| four.get(i).map_or(0.0, value) as f32));
-            let sampled = sampler.leaves(Frequencies4 { x: of_four(&|read| read.f.x), y: of_four(&|read| read.f.y) });
-            for (i, read) in four.iter().enumerate() {
-                left[read.of] += read.leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
-            }
-        }
-        left
+        sum_of(&self.reads(area, beside_px), self.0.len(), area, over)
     }
 
     /// A single read of each, and of what looks like it, as far as that counts.
@@ -172,7 +149,7 @@ mod tests {
     use crate::{
         plan::{
             SurfaceReads,
-            transfer::{Path, read_wave},
+            transfer::{Path, exact::read_wave, read_waves},
         },
         temporal::TapStage,
     };
@@ -188,10 +165,12 @@ mod tests {
             let samples = [1, 2, 7, 40, 300].map(|samples| Over::Samples(Path { along, samples }));
             for over in samples.into_iter().chain([Over::Instant, Over::All(along)]) {
                 let beside_px = DVec2::new(0.37, 0.81);
-                for (wave, found) in waves.0.iter().zip(waves.read(&area, over, beside_px)) {
-                    let f = TABLE[wave.index].f;
+                let all: Vec<DVec2> = waves.0.iter().map(|wave| TABLE[wave.index].f).collect();
+                let of_any = read_waves(&all.iter().map(|&f| [f, beside_px]).collect::<Vec<_>>(), &area, over);
+                for ((&f, found), of_any) in all.iter().zip(waves.read(&area, over, beside_px)).zip(of_any) {
                     let expected = read_wave(f, &area, over, beside_px);
-                    assert!(found.distance(expected) < 2e-5, "{stage:?} {scale} {over:?} {f}: {found} {expected}");
+                    let off = found.distance(expected).max(of_any.distance(expected));
+                    assert!(off < 2e-5, "{stage:?} {scale} {over:?} {f}: {found}, {of_any}, not {expected}");
                 }
             }
         }
