@@ -147,6 +147,8 @@ impl CameraPath {
         peak(&self.translations)
     }
 
+    /// Inlined, so that poses, which are asked for most, leave out all rates.
+    #[inline(always)]
     fn at(&self, t_s: f64) -> (BodyState, Offset) {
         let body = self.trajectory.state(t_s);
         let mut offset = Offset {

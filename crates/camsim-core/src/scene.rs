@@ -23,8 +23,8 @@ pub use light::{Light, turned_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
 pub use terrain::{
-    Aabb, CHUNK_CELLS, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid, TerrainHit,
-    TerrainMesh, TerrainVertex, VERTEX_BITS,
+    Aabb, CHUNK_CELLS, DrawnCell, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid,
+    TerrainHit, TerrainMesh, TerrainVertex, VERTEX_BITS,
 };
 pub use texture::{Encoding, MipLevel, TexelForm, Texture, Wrap, linear_from_srgb, srgb_from_linear};
 

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
-    scene::{TerrainDetail, TerrainHit},
+    scene::{DrawnCell, TerrainDetail, TerrainHit},
     shutter::Shutter,
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
     temporal::{IdealGeometry, blend_inverse_depths, displacement::Twist, plane_on_line, through_three},
@@ -88,6 +88,8 @@ struct KeyDepth<'a> {
     /// The terrain as it will be drawn.
     detail: Option<&'a TerrainDetail<'a>>,
     known: Vec<([i64; 2], f64)>,
+    /// What is drawn where the last ray met the terrain: neighbours mostly meet the same cell.
+    drawn: Option<DrawnCell>,
 }
 
 impl Trial<'_> {
@@ -123,7 +125,7 @@ impl Trial<'_> {
         let own_px = self.ideal.px_from_point(probe.uv.extend(1.0));
         let mut outcome =
             Outcome { still_px: off(own_px), parallax_px: off(self.ideal.px_from_point(truth.direction)), ..Outcome::default() };
-        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16) };
+        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(16), drawn: None };
         let places = self.settle(probe.uv, truth.in_key, None, &mut depth);
         outcome.after = places.map(off);
         outcome.after[0] = outcome.parallax_px;
@@ -151,7 +153,7 @@ impl Trial<'_> {
         if truth.t_s == mid_s {
             return None;
         }
-        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(8) };
+        let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(8), drawn: None };
         let looked_at = self.settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), None, &mut depth);
         let (direction, shift) = (truth.direction, truth.in_key.1);
         Some(std::array::from_fn(|n| {
@@ -335,13 +337,16 @@ impl KeyDepth<'_> {
     }
 
     /// What is drawn at a place of the key frame, between its texels too.
-    fn along(&self, at_px: DVec2) -> f64 {
+    fn along(&mut self, at_px: DVec2) -> f64 {
         let trial = self.trial;
-        let ray = trial.key_ray(at_px);
-        match trial.surfaces.meet(trial.key_pose.position_ned_m, ray) {
-            None => 0.0,
-            Some(Met { terrain: Some(hit), .. }) => 1.0 / trial.drawn_depth_m(self.detail, &hit, ray),
-            Some(met) => 1.0 / met.depth_m,
+        let (origin, ray) = (trial.key_pose.position_ned_m, trial.key_ray(at_px));
+        match (trial.surfaces.meet(origin, ray), self.detail) {
+            (None, _) => 0.0,
+            (Some(Met { terrain: Some(hit), .. }), Some(detail)) => {
+                let drawn = self.drawn.take().filter(|drawn| drawn.is_of(&hit)).unwrap_or_else(|| detail.drawn_at(&hit));
+                1.0 / self.drawn.insert(drawn).t(&hit, origin, ray)
+            }
+            (Some(met), _) => 1.0 / met.depth_m,
         }
     }
 

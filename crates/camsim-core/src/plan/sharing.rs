@@ -239,16 +239,22 @@ impl Planner {
         let common = self.common(frames.clone(), own)?;
         let candidates = Candidates::new(self, &common);
         let is_worth_it = |price: f64, count: u64| price < (1.0 - WORTH) * own.price_ms * count as f64;
+        // The outermost have the most silhouettes elsewhere: what even the finest of ideal frames cannot show them needs no sampling.
+        candidates.see(frames.end - 1, None)?;
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
             let sampling = candidates.sampling(coarsest, share_of_dn)?;
-            // The outermost have the most silhouettes elsewhere.
             candidates.see(frames.end - 1, Some(sampling))?;
-            let first = candidates.plan(frames.start, sampling);
-            let first = first.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
+            // Pictures take less than plans, and more often tell that it does not do.
             let by_pictures = candidates.too_coarse(sampling, own).ok()?;
-            let plans = if by_pictures.is_none() { Some(candidates.plan_others(first, sampling, own)?) } else { None };
+            let plans = if by_pictures.is_none() {
+                let first = candidates.plan(frames.start, sampling);
+                let first = first.filter(|plan| keeps_px(plan, own) && is_worth_it(plan.price_ms, 1))?;
+                Some(candidates.plan_others(first, sampling, own)?)
+            } else {
+                None
+            };
             match by_pictures.or_else(|| most_wrong(plans.as_ref()?, own)) {
                 // Nothing that was tried does for it.
                 Some(frame) if frame == coarsest => return None,

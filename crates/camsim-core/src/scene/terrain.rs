@@ -42,7 +42,7 @@ pub use placed::PlacedMesh;
 pub(crate) use query::Frustum;
 pub use query::TerrainHit;
 pub(crate) use query::intersect_triangle;
-pub use select::{LodSelection, TerrainMesh, VERTEX_BITS};
+pub use select::{DrawnCell, LodSelection, TerrainMesh, VERTEX_BITS};
 use tree::BlockTree;
 
 use super::Texture;

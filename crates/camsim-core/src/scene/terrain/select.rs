@@ -88,22 +88,27 @@ impl TerrainDetail<'_> {
         ChunkPart { indices: walk.emit.indices, away: walk.emit.away, nearest: walk.nearest, distance_m }
     }
 
-    /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn there instead: the plane of that over or
-    /// under the hit's cell which the ray passes deepest inside. Where the ray leaves that cell's triangles before it meets them, their planes are continued.
+    /// Ray parameter at which a ray that meets the full surface at `hit` meets the triangle that is drawn there instead: see [`DrawnCell::t`].
     pub fn drawn_t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
-        let chunk = &self.terrain.chunks[hit.chunk as usize];
-        let Some(known) = self.tolerances(hit.chunk) else { return hit.t };
+        self.drawn_at(hit).t(hit, origin_ned_m, direction_ned)
+    }
+
+    /// What is drawn over or under the cell that a ray meets.
+    pub fn drawn_at(&self, hit: &TerrainHit) -> DrawnCell {
+        let (chunk, cell) = (&self.terrain.chunks[hit.chunk as usize], hit.cell);
+        let mut drawn = DrawnCell { chunk: hit.chunk, cell, triangles: Some(Vec::with_capacity(4)) };
+        let Some(known) = self.tolerances(hit.chunk) else { return DrawnCell { triangles: None, ..drawn } };
         let judged = Judged::new(self, known, hit.chunk);
-        let mut best = (f64::NEG_INFINITY, hit.t);
-        let mut stack: Vec<([u32; 3], u32)> = ROOTS.map(|root| (root, 0)).to_vec();
-        while let Some((triangle, depth)) = stack.pop() {
+        let mut waiting = Vec::with_capacity(2 + DEPTHS as usize);
+        waiting.extend(ROOTS.map(|root| (root, 0)));
+        while let Some((triangle, depth)) = waiting.pop() {
             let corners = triangle.map(|vertex| {
                 let [i, j] = lattice::place(vertex);
                 [i.min(chunk.cells[0]), j.min(chunk.cells[1])]
             });
             let beside = |axis: usize| {
                 let along = corners.map(|corner| corner[axis]);
-                hit.cell[axis] >= along.into_iter().fold(0, u32::max) || hit.cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
+                cell[axis] >= along.into_iter().fold(0, u32::max) || cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
             };
             if beside(0) || beside(1) {
                 continue;
@@ -111,14 +116,40 @@ impl TerrainDetail<'_> {
             if depth < DEPTHS {
                 let (middle, halves) = lattice::halves(triangle);
                 if judged.vertex(middle).is_needed() {
-                    stack.extend(halves.map(|half| (half, depth + 1)));
+                    waiting.extend(halves.map(|half| (half, depth + 1)));
                     continue;
                 }
             } else if lattice::cell_to_turn(triangle).is_none_or(|cell| judged.cell(cell).is_needed()) {
-                // The full surface itself.
-                return hit.t;
+                return DrawnCell { triangles: None, ..drawn };
             }
-            let [a, b, c] = corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j) - origin_ned_m);
+            let points = corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j));
+            drawn.triangles.get_or_insert_default().push(points);
+        }
+        drawn
+    }
+}
+
+/// What is drawn over or under one cell of the terrain.
+#[derive(Clone, Debug)]
+pub struct DrawnCell {
+    chunk: u32,
+    cell: [u32; 2],
+    /// Corners, NED, metres; `None` for the full surface itself.
+    triangles: Option<Vec<[DVec3; 3]>>,
+}
+
+impl DrawnCell {
+    /// Whether it is the cell that a ray meets.
+    pub fn is_of(&self, hit: &TerrainHit) -> bool {
+        (self.chunk, self.cell) == (hit.chunk, hit.cell)
+    }
+
+    /// Ray parameter at which a ray that meets the full surface at `hit`, in this cell, meets the triangle that is drawn there instead: the plane of that which the
+    /// ray passes deepest inside. Where the ray leaves the triangles before it meets them, their planes are continued.
+    pub fn t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
+        let mut best = (f64::NEG_INFINITY, hit.t);
+        for points in self.triangles.iter().flatten() {
+            let [a, b, c] = points.map(|point| point - origin_ned_m);
             let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
             let normal = (b - a).cross(c - a);
             // How far inside the triangle the ray passes, of its area; NaN for a triangle without area, which never is the best.
