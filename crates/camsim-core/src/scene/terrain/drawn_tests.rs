@@ -384,19 +384,30 @@ fn rays_meet_the_drawn_surface_where_its_triangles_are() {
             let detail = TerrainDetail::new(&terrain, &nadir(DVec3::new(0.0, 0.0, -3000.0)), TANGENTS, FOCAL_PX, max_error_px);
             let drawn: Vec<[DVec3; 3]> =
                 triangles(&terrain, &detail.mesh()).into_iter().map(|t| t.map(|place| vertex_m(&terrain, place))).collect();
-            let (mut met, mut moved) = (0, 0.0_f64);
+            let (mut met, mut moved, mut known) = (0, 0.0_f64, [0; 2]);
             for _ in 0..200 {
                 let above = DVec3::new(random.within(-640.0, 640.0), random.within(-640.0, 640.0), -500.0);
                 // Straight down the two surfaces are met in one and the same cell.
                 let Some(hit) = terrain.intersect(above, DVec3::Z, f64::INFINITY) else { continue };
                 let exact = drawn.iter().filter_map(|&t| Some(intersect_triangle(t, above, DVec3::Z, f64::INFINITY)?.0));
                 let exact = exact.min_by(f64::total_cmp).unwrap();
-                let found = detail.drawn_t(&hit, above, DVec3::Z);
+                let drawn_here = detail.drawn_at(&hit);
+                let found = drawn_here.t(&hit, above, DVec3::Z);
                 met += 1;
                 moved = moved.max((exact - hit.t).abs());
                 assert!((found - exact).abs() < 1e-6, "{max_error_px} px: {found} {exact} {}", hit.t);
+                // What is drawn there is known for the same cell, and not for its like in the next chunk.
+                for (of, aside_m) in [1.0, 640.0].into_iter().enumerate() {
+                    let beside = above + aside_m * DVec3::Y;
+                    let Some(hit) = terrain.intersect(beside, DVec3::Z, f64::INFINITY).filter(|hit| drawn_here.is_of(hit)) else {
+                        continue;
+                    };
+                    known[of] += 1;
+                    assert_eq!(drawn_here.t(&hit, beside, DVec3::Z), detail.drawn_t(&hit, beside, DVec3::Z));
+                }
             }
             assert!(met > 60, "{met}");
+            assert!(known[0] > met / 2 && known[1] == 0, "{known:?}");
             assert!((max_error_px == 0.0) == (moved < 1e-9), "{max_error_px} px moves by {moved}");
         }
     }

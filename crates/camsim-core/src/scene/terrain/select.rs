@@ -96,8 +96,8 @@ impl TerrainDetail<'_> {
     /// What is drawn over or under the cell that a ray meets.
     pub fn drawn_at(&self, hit: &TerrainHit) -> DrawnCell {
         let (chunk, cell) = (&self.terrain.chunks[hit.chunk as usize], hit.cell);
-        let mut drawn = DrawnCell { chunk: hit.chunk, cell, triangles: Some(Vec::with_capacity(4)) };
-        let Some(known) = self.tolerances(hit.chunk) else { return DrawnCell { triangles: None, ..drawn } };
+        let mut drawn = DrawnCell { chunk: hit.chunk, cell, triangles: Vec::with_capacity(4) };
+        let Some(known) = self.tolerances(hit.chunk) else { return drawn };
         let judged = Judged::new(self, known, hit.chunk);
         let mut waiting = Vec::with_capacity(2 + DEPTHS as usize);
         waiting.extend(ROOTS.map(|root| (root, 0)));
@@ -120,10 +120,9 @@ impl TerrainDetail<'_> {
                     continue;
                 }
             } else if lattice::cell_to_turn(triangle).is_none_or(|cell| judged.cell(cell).is_needed()) {
-                return DrawnCell { triangles: None, ..drawn };
+                return DrawnCell { triangles: Vec::new(), ..drawn };
             }
-            let points = corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j));
-            drawn.triangles.get_or_insert_default().push(points);
+            drawn.triangles.push(corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j)));
         }
         drawn
     }
@@ -134,8 +133,8 @@ impl TerrainDetail<'_> {
 pub struct DrawnCell {
     chunk: u32,
     cell: [u32; 2],
-    /// Corners, NED, metres; `None` for the full surface itself.
-    triangles: Option<Vec<[DVec3; 3]>>,
+    /// Corners, NED, metres; none for the full surface itself.
+    triangles: Vec<[DVec3; 3]>,
 }
 
 impl DrawnCell {
@@ -148,7 +147,7 @@ impl DrawnCell {
     /// ray passes deepest inside. Where the ray leaves the triangles before it meets them, their planes are continued.
     pub fn t(&self, hit: &TerrainHit, origin_ned_m: DVec3, direction_ned: DVec3) -> f64 {
         let mut best = (f64::NEG_INFINITY, hit.t);
-        for points in self.triangles.iter().flatten() {
+        for points in &self.triangles {
             let [a, b, c] = points.map(|point| point - origin_ned_m);
             let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction_ned.dot(n));
             let normal = (b - a).cross(c - a);
