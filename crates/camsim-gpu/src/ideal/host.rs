@@ -38,7 +38,7 @@ use corners::{Camera, Corner};
 use cover::{BEYOND, Band, SKY};
 use models::{Piece, TRIANGLES_A_CHUNK};
 use picture::Picture;
-use shade::{Paint, Shader};
+use shade::{Paint, Planes, Shader};
 use triangles::{BAND_ROWS, Chunk, Kind};
 
 /// Corners of the terrain that a task projects.
@@ -271,10 +271,11 @@ fn fill_band(vectors: impl Vectors, shader: &Shader<'_>, mut band: Band<'_>, col
     let width = shader.camera.size_px[0] as usize;
     let rows =
         band.depth.chunks_exact(band.stride).zip(band.shown.chunks_exact(band.stride)).zip(color.chunks_exact_mut(CHANNELS * band.stride));
+    let mut planes = Planes::new();
     for (row, ((depth, shown), color)) in rows.enumerate() {
         let blocks = depth.as_chunks().0.iter().zip(shown.as_chunks().0).zip(color.chunks_exact_mut(CHANNELS * LANES));
         for (number, ((depth, shown), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
-            shader.block(vectors, [number * LANES, band.first_row + row], depth, shown, color);
+            shader.block(vectors, [number * LANES, band.first_row + row], depth, shown, &mut planes, color);
         }
     }
 }

@@ -54,11 +54,16 @@ impl Piece {
     #[inline(always)]
     pub fn draw(&self, camera: &Camera, pose: &CameraPose, stands: &PlacedShape, kind: Kind, chunk: &mut Chunk) {
         let place = Place::new(pose, stands);
-        let corner = |corner: &MeshVertex| camera.corner(place.in_camera_m(corner.position_m), corner.uv);
-        self.add(camera, &self.corners.iter().map(corner).collect::<Vec<_>>(), kind, chunk);
+        let mut corners = Vec::with_capacity(self.corners.len());
+        // A loop: what iterators call may be compiled without the vectors that this is.
+        for corner in &self.corners {
+            corners.push(camera.corner(place.in_camera_m(corner.position_m), corner.uv));
+        }
+        self.add(camera, &corners, kind, chunk);
     }
 
     /// The same with tints of its corners, in a light that falls on it.
+    #[inline(always)]
     pub fn draw_more(&self, camera: &Camera, pose: &CameraPose, stands: &PlacedShape, light: Option<Light>, kind: Kind, chunk: &mut Chunk) {
         let place = Place::new(pose, stands);
         let more = |k: usize| -> [f32; 2] {
@@ -66,15 +71,11 @@ impl Piece {
             let normal = turned_normal(&stands.ned_from_shape, Vec3::from(*normal).as_dvec3());
             [(light.sun * normal.dot(light.to_sun_ned)) as f32, normal.z as f32]
         };
-        let corners: Vec<Corner<{ 2 + MORE }>> = self
-            .corners
-            .iter()
-            .enumerate()
-            .map(|(k, corner)| {
-                let ([u, v], [r, g, b, _], [sun, down]) = (corner.uv, corner.tint, more(k));
-                camera.corner(place.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down])
-            })
-            .collect();
+        let mut corners: Vec<Corner<{ 2 + MORE }>> = Vec::with_capacity(self.corners.len());
+        for (k, corner) in self.corners.iter().enumerate() {
+            let ([u, v], [r, g, b, _], [sun, down]) = (corner.uv, corner.tint, more(k));
+            corners.push(camera.corner(place.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down]));
+        }
         self.add(camera, &corners, kind, chunk);
     }
 

@@ -1,6 +1,6 @@
 //! Colours of pixels whose triangle and depth are known: each is worked out once, whatever is behind it.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use camsim_core::plan::SurfaceReads;
 
@@ -12,7 +12,7 @@ use super::{
     triangles::{Chunk, FLAT, Kind, Plane, SMALL, Surface},
 };
 use crate::host::{
-    lanes::{LANES, Lanes, ZERO, each},
+    lanes::{LANES, Lanes, each},
     vectors::Vectors,
 };
 
@@ -41,6 +41,69 @@ pub(super) struct Shader<'a> {
 
 const NO_SURFACE: Surface = Surface { first: [0.0; 2], paint: SKY, u: [0.0; 3], v: [0.0; 3], inverse: [0.0; 3], more: 0, large: SMALL };
 
+/// Pixels of one triangle that are written together.
+const AT_ONCE: usize = 8;
+
+/// A number for each pixel, and room for those that are written together with the last one.
+type Room<T> = [T; LANES + AT_ONCE];
+
+/// What pixels have of their triangles' planes, which depth is not yet taken out of.
+pub(super) struct Planes {
+    paint: Room<u32>,
+    /// Texture coordinates.
+    uv: [Room<f32>; 2],
+    /// How texture coordinates and near / z change across and down.
+    changes: [[Room<f32>; 2]; 3],
+}
+
+impl Planes {
+    pub fn new() -> Self {
+        let zero = [0.0; LANES + AT_ONCE];
+        Self { paint: [SKY; LANES + AT_ONCE], uv: [zero; 2], changes: [[zero; 2]; 3] }
+    }
+
+    /// Writes those of pixels that show a triangle; of some beyond them too.
+    #[inline(always)]
+    fn write(&mut self, surface: &Surface, [x, y]: [usize; 2], pixels: Range<usize>) {
+        let Surface { first: [left, top], u, v, inverse, .. } = surface;
+        let down_px = y as f32 - top;
+        let begins = [u[2].mul_add(down_px, u[0]), v[2].mul_add(down_px, v[0])];
+        let mut first = pixels.start;
+        while first < pixels.end {
+            let from_px = (x + first) as f32 - left;
+            for i in 0..AT_ONCE {
+                let across_px = from_px + i as f32;
+                self.paint[first + i] = surface.paint;
+                self.uv[0][first + i] = u[1].mul_add(across_px, begins[0]);
+                self.uv[1][first + i] = v[1].mul_add(across_px, begins[1]);
+                (self.changes[0][0][first + i], self.changes[0][1][first + i]) = (u[1], u[2]);
+                (self.changes[1][0][first + i], self.changes[1][1][first + i]) = (v[1], v[2]);
+                (self.changes[2][0][first + i], self.changes[2][1][first + i]) = (inverse[1], inverse[2]);
+            }
+            first += AT_ONCE;
+        }
+    }
+
+    /// Texture coordinates of a large triangle.
+    #[inline(always)]
+    fn write_large(
+        &mut self,
+        [inverse, u, v]: &[[f64; 3]; 3],
+        first_px: [f32; 2],
+        [x, y]: [usize; 2],
+        pixels: Range<usize>,
+        depth: &[f32; LANES],
+    ) {
+        let down_px = f64::from(y as f32 - first_px[1]);
+        for i in pixels {
+            let across_px = f64::from((x + i) as f32 - first_px[0]);
+            let at = |plane: &[f64; 3]| plane[0] + plane[1] * across_px + plane[2] * down_px;
+            let times = f64::from(depth[i]) / at(inverse);
+            (self.uv[0][i], self.uv[1][i]) = ((at(u) * times) as f32, (at(v) * times) as f32);
+        }
+    }
+}
+
 /// What surfaces have at pixels.
 struct Seen {
     paint: [u32; LANES],
@@ -60,17 +123,23 @@ impl Shader<'_> {
 
     /// Half floats of linear R G B A of pixels of a row, from `x` on.
     #[inline(always)]
-    pub fn block(&self, vectors: impl Vectors, [x, y]: [usize; 2], depth: &[f32; LANES], shown: &[u32; LANES], out: &mut [u16]) {
-        let mut colors = [[0.0; 4]; LANES];
+    pub fn block(
+        &self,
+        vectors: impl Vectors,
+        [x, y]: [usize; 2],
+        depth: &[f32; LANES],
+        shown: &[u32; LANES],
+        planes: &mut Planes,
+        out: &mut [u16],
+    ) {
         let [r, g, b, _] = self.camera.uniforms.sky;
+        let mut colors = [[r, g, b, 1.0]; LANES];
         let is_empty = shown.iter().all(|&shown| shown == SKY);
         if is_empty && self.is_over {
             return;
         }
-        if is_empty {
-            colors = [[r, g, b, 1.0]; LANES];
-        } else {
-            let seen = self.seen([x, y], depth, shown);
+        if !is_empty {
+            let seen = self.seen([x, y], depth, shown, planes);
             let mut left = seen.paint.map(|paint| paint != SKY);
             while let Some(first) = left.iter().position(|&is_left| is_left) {
                 let paint = seen.paint[first];
@@ -95,31 +164,31 @@ impl Shader<'_> {
     }
 
     #[inline(always)]
-    fn seen(&self, [x, y]: [usize; 2], depth: &[f32; LANES], shown: &[u32; LANES]) -> Seen {
-        let mut paint = [SKY; LANES];
-        let (mut u, mut v) = (ZERO, ZERO);
-        let (mut across, mut down) = ([ZERO; 3], [ZERO; 3]);
-        for i in 0..LANES {
-            let surface = self.surface(shown[i]);
-            paint[i] = surface.paint;
-            let px = [(x + i) as f32 - surface.first[0], y as f32 - surface.first[1]];
-            (u[i], v[i]) = (at(surface.u, px), at(surface.v, px));
-            if surface.large != SMALL {
-                let [inverse, of_u, of_v] = self.chunks[(shown[i] >> CHUNK_BITS) as usize].large[surface.large as usize];
-                let at = |plane: [f64; 3]| plane[0] + plane[1] * f64::from(px[0]) + plane[2] * f64::from(px[1]);
-                let times = f64::from(depth[i]) / at(inverse);
-                (u[i], v[i]) = ((at(of_u) * times) as f32, (at(of_v) * times) as f32);
+    fn seen(&self, [x, y]: [usize; 2], depth: &[f32; LANES], shown: &[u32; LANES], planes: &mut Planes) -> Seen {
+        // Neighbours mostly show the same triangle. What is written beyond its end the next one writes over.
+        let mut begin = 0;
+        while begin < LANES {
+            let mut end = begin + 1;
+            while end < LANES && shown[end] == shown[begin] {
+                end += 1;
             }
-            (across[0][i], down[0][i]) = (surface.u[1], surface.u[2]);
-            (across[1][i], down[1][i]) = (surface.v[1], surface.v[2]);
-            (across[2][i], down[2][i]) = (surface.inverse[1], surface.inverse[2]);
+            let surface = self.surface(shown[begin]);
+            planes.write(surface, [x, y], begin..end);
+            if surface.large != SMALL {
+                let large = &self.chunks[(shown[begin] >> CHUNK_BITS) as usize].large[surface.large as usize];
+                planes.write_large(large, surface.first, [x, y], begin..end, depth);
+            }
+            begin = end;
         }
+        let Planes { paint: all, uv: [u, v], changes: [[u_across, u_down], [v_across, v_down], [inverse_across, inverse_down]] } = planes;
+        let mut paint = [SKY; LANES];
+        paint.copy_from_slice(&all[..LANES]);
         // Where there is no surface it does not matter.
         let z = each(|i| 1.0 / if depth[i] > 0.0 { depth[i] } else { 1.0 });
         let (u, v) = (each(|i| u[i] * z[i]), each(|i| v[i] * z[i]));
-        let change = |place: &Lanes, of: &Lanes, inverse: &Lanes| each(|i| (of[i] - place[i] * inverse[i]) * z[i]);
-        let across = [change(&u, &across[0], &across[2]), change(&v, &across[1], &across[2])];
-        let down = [change(&u, &down[0], &down[2]), change(&v, &down[1], &down[2])];
+        let change = |place: &Lanes, of: &Room<f32>, inverse: &Room<f32>| each(|i| (of[i] - place[i] * inverse[i]) * z[i]);
+        let across = [change(&u, u_across, inverse_across), change(&v, v_across, inverse_across)];
+        let down = [change(&u, u_down, inverse_down), change(&v, v_down, inverse_down)];
         Seen { paint, places: Places { uv: [u, v], across, down }, z }
     }
 
@@ -163,7 +232,7 @@ impl Shader<'_> {
         Kind::lit(paint.sky, [of(r), of(g), of(b), of(sun), of(down)])
     }
 
-    /// Twin of shaders/ideal/fog; sky where there is no surface; no mark anywhere.
+    /// Twin of shaders/ideal/fog. Where there is no surface colours are the sky's, and remain so.
     #[inline(always)]
     fn fog(&self, [x, y]: [usize; 2], seen: &Seen, colors: &mut Colors) {
         let Camera { uniforms, focal_px, principal_px, .. } = self.camera;
@@ -181,10 +250,6 @@ impl Shader<'_> {
                     colors[i][k] = share[i].mul_add(colors[i][k] - sky[k], sky[k]);
                 }
             }
-        }
-        for (color, &paint) in colors.iter_mut().zip(&seen.paint) {
-            let [red, green, blue, _] = *color;
-            *color = if paint == SKY { [r, g, b, 1.0] } else { [red, green, blue, 1.0] };
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use camsim_core::temporal::tap_shares;
 
-use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, within};
+use crate::host::lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within};
 use crate::reverse::TapKind;
 
 /// Reads along a side at most: of each grid up to that the order of reads is written down.
@@ -12,15 +12,21 @@ const WIDEST_SPLINE_PX: f32 = 1.732_050_8;
 
 /// Where the reads of every grid lie, as shares of its sides, in their order.
 #[derive(Debug)]
-pub(super) struct Cells(Vec<Vec<[f32; 2]>>);
+pub(super) struct Cells {
+    /// Of all grids, one after the other.
+    shares: Vec<[f32; 2]>,
+    /// Where those of a grid begin.
+    begins: [u32; (MOST_TAPS * MOST_TAPS) as usize],
+}
 
 impl Cells {
     pub fn new() -> Self {
-        Self((0..MOST_TAPS * MOST_TAPS).map(|grid| tap_shares([grid % MOST_TAPS + 1, grid / MOST_TAPS + 1])).collect())
-    }
-
-    fn of(&self, [across, down]: [u32; 2]) -> &[[f32; 2]] {
-        &self.0[(down.clamp(1, MOST_TAPS) * MOST_TAPS + across.clamp(1, MOST_TAPS) - MOST_TAPS - 1) as usize]
+        let mut cells = Self { shares: Vec::new(), begins: [0; (MOST_TAPS * MOST_TAPS) as usize] };
+        for (grid, begin) in (0..).zip(&mut cells.begins) {
+            *begin = cells.shares.len() as u32;
+            cells.shares.extend(tap_shares([grid % MOST_TAPS + 1, grid / MOST_TAPS + 1]));
+        }
+        cells
     }
 }
 
@@ -35,7 +41,12 @@ pub(super) struct Footprint<'a> {
 struct Grid<'a> {
     dx: Lanes2,
     dy: Lanes2,
-    cells: [&'a [[f32; 2]]; LANES],
+    shares: &'a [[f32; 2]],
+    /// Where a pixel's shares begin, and how many there are.
+    begin: [u32; LANES],
+    count: Lanes,
+    /// Whether that is the same for all.
+    is_common: bool,
 }
 
 impl<'a> Footprint<'a> {
@@ -46,25 +57,24 @@ impl<'a> Footprint<'a> {
             return Self { grid: None, softness: None };
         }
         let sides = sides();
-        let softness = matches!(tap, TapKind::Spline | TapKind::SplineOrGrid).then(|| softness(&sides));
-        let grid = matches!(tap, TapKind::Grid | TapKind::SplineOrGrid).then(|| Grid::new(cells, &sides, most));
+        // Written out: what `then` calls may be compiled without the vectors that this is.
+        let softness = if matches!(tap, TapKind::Spline | TapKind::SplineOrGrid) { Some(softness(&sides)) } else { None };
+        let grid = if matches!(tap, TapKind::Grid | TapKind::SplineOrGrid) { Some(Grid::new(cells, &sides, most)) } else { None };
         Self { grid, softness }
     }
 
     /// Reads of a pixel that see all of it.
     #[inline(always)]
     pub fn reads(&self, i: usize) -> f32 {
-        self.grid.as_ref().map_or(1.0, |grid| grid.cells[i].len() as f32)
+        self.grid.as_ref().map_or(1.0, |grid| grid.count[i])
     }
 
     /// Where read number `tap` (cyclic) of each pixel lies.
     #[inline(always)]
-    pub fn moved(&self, at_px: &Lanes2, tap: impl Fn(usize) -> f32) -> Lanes2 {
-        let Some(Grid { dx, dy, cells }) = &self.grid else { return *at_px };
-        let (mut across, mut down) = (ZERO, ZERO);
-        for i in 0..LANES {
-            [across[i], down[i]] = cells[i][tap(i) as usize % cells[i].len()];
-        }
+    pub fn moved(&self, at_px: &Lanes2, tap: &Lanes) -> Lanes2 {
+        let Some(grid) = &self.grid else { return *at_px };
+        let Lanes2 { x: across, y: down } = grid.shares_of(tap);
+        let Grid { dx, dy, .. } = grid;
         Lanes2 {
             x: each(|i| at_px.x[i] + dx.x[i] * across[i] + dy.x[i] * down[i]),
             y: each(|i| at_px.y[i] + dx.y[i] * across[i] + dy.y[i] * down[i]),
@@ -73,32 +83,55 @@ impl<'a> Footprint<'a> {
 }
 
 impl<'a> Grid<'a> {
+    #[inline(always)]
     fn new(cells: &'a Cells, sides: &[Lanes2; 2], most: u32) -> Self {
-        let mut taps = [[1; 2]; LANES];
-        let mut spread = |axis: usize| {
-            let (side, stretch) = (&sides[axis], sides[axis].length());
-            let mut factor = ZERO;
-            for i in 0..LANES {
-                if stretch[i] > WIDEST_SPLINE_PX {
-                    taps[i][axis] = ((stretch[i] - 0.1).ceil() as u32).clamp(1, most.max(1));
-                }
-                let n = taps[i][axis] as f32;
-                if n > 1.0 {
-                    // What the reads have themselves the grid need not have.
-                    factor[i] = ((stretch[i] * stretch[i] - 3.0).max(0.0) / (1.0 - 1.0 / (n * n))).sqrt() / stretch[i];
-                }
-            }
-            Lanes2 { x: each(|i| side.x[i] * factor[i]), y: each(|i| side.y[i] * factor[i]) }
-        };
-        let (dx, dy) = (spread(0), spread(1));
-        Self { dx, dy, cells: taps.map(|taps| cells.of(taps)) }
+        let most = most.clamp(1, MOST_TAPS) as f32;
+        let (dx, across) = spread(&sides[0], most);
+        let (dy, down) = spread(&sides[1], most);
+        let mut begin = [0; LANES];
+        for i in 0..LANES {
+            begin[i] = cells.begins[(whole(down[i]) * MOST_TAPS + whole(across[i]) - MOST_TAPS - 1) as usize % cells.begins.len()];
+        }
+        let is_common = begin.iter().all(|&of| of == begin[0]);
+        Self { dx, dy, shares: &cells.shares, begin, count: each(|i| across[i] * down[i]), is_common }
+    }
+
+    /// Shares of the sides at which read number `tap` (cyclic) of each pixel lies.
+    #[inline(always)]
+    fn shares_of(&self, tap: &Lanes) -> Lanes2 {
+        // Half a read further the quotient is never so near a whole number that rounding could pass it.
+        let turn = each(|i| tap[i] - ((tap[i] + 0.5) / self.count[i]).floor() * self.count[i]);
+        let share = |i: usize| self.shares.get((self.begin[i] + whole(turn[i])) as usize).copied().unwrap_or_default();
+        if self.is_common && turn.iter().all(|&of| of == turn[0]) {
+            let [across, down] = share(0);
+            return Lanes2 { x: [across; LANES], y: [down; LANES] };
+        }
+        let mut shares = Lanes2::ZERO;
+        for i in 0..LANES {
+            [shares.x[i], shares.y[i]] = share(i);
+        }
+        shares
     }
 }
 
+/// Sides of the grids of reads, and how many reads there are along them.
+#[inline(always)]
+fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
+    let stretch = side.length();
+    let taps = each(|i| if stretch[i] > WIDEST_SPLINE_PX { lower(higher((stretch[i] - 0.1).ceil(), 1.0), most) } else { 1.0 });
+    // What the reads have themselves the grid need not have.
+    let factor = each(|i| {
+        let wide = (higher(stretch[i] * stretch[i] - 3.0, 0.0) / (1.0 - 1.0 / (taps[i] * taps[i]))).sqrt() / stretch[i];
+        if taps[i] > 1.0 { wide } else { 0.0 }
+    });
+    (Lanes2 { x: each(|i| side.x[i] * factor[i]), y: each(|i| side.y[i] * factor[i]) }, taps)
+}
+
 /// A pixel's variance beyond the ideal pixel's own, as the spline has it.
+#[inline(always)]
 fn softness(sides: &[Lanes2; 2]) -> Lanes2 {
-    let [x, y] = sides.each_ref().map(|side| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0)));
-    Lanes2 { x, y }
+    let along = |side: &Lanes2| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0));
+    Lanes2 { x: along(&sides[0]), y: along(&sides[1]) }
 }
 
 /// A cubic spline as five bilinear reads: the one between, those above and below it, those left and right of it.
@@ -170,6 +203,7 @@ impl Axis {
 }
 
 /// A number for each of both axes.
+#[inline(always)]
 pub(super) fn scaled(lanes: &Lanes2, [x, y]: [f32; 2]) -> Lanes2 {
     let times = |lanes: &Lanes, by: f32| each(|i| lanes[i] * by);
     Lanes2 { x: times(&lanes.x, x), y: times(&lanes.y, y) }

@@ -139,8 +139,8 @@ impl Reads<'_> {
         if self.tells_truth && self.frame.coords_phase == 0.0 {
             at_phase_px = self.solve(uv, mid).at_px;
         }
-        for color in &mut sum {
-            *color = color.map(|part| part * per_stretch);
+        for part in sum.as_flattened_mut() {
+            *part *= per_stretch;
         }
         Gathered { color: sum, inside, at_phase_px }
     }
@@ -174,8 +174,8 @@ impl Reads<'_> {
         let mut sample = 0.0;
         while sample < most {
             let step = each(|i| steps * share[i] * (sample + 0.5));
-            let tap = |i: usize| taken[i] + sample;
-            self.add_sample(vectors, &curve.along(&step), area, tap, |i| count[i] > sample, &mut of_curve);
+            let tap = each(|i| taken[i] + sample);
+            self.add_sample(vectors, &curve.along(&step), area, &tap, |i| count[i] > sample, &mut of_curve);
             sample += 1.0;
         }
         for i in 0..LANES {
@@ -192,7 +192,7 @@ impl Reads<'_> {
         vectors: impl Vectors,
         at_px: &Lanes2,
         area: &Footprint<'_>,
-        tap: impl Fn(usize) -> f32,
+        tap: &Lanes,
         is_taken: impl Fn(usize) -> bool,
         sum: &mut [Halves; LANES],
     ) {

@@ -1,6 +1,6 @@
 //! Reads of the ideal frame.
 
-use crate::host::lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within};
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole, within};
 use crate::host::vectors::Vectors;
 use crate::layout::FrameUniforms;
 
@@ -48,13 +48,11 @@ impl IdealOnHost<'_> {
     #[inline(always)]
     pub(super) fn inverse_depth(&self, frame: &FrameUniforms, at_px: &Lanes2) -> Lanes {
         let Around { first, t } = around(frame, at_px, self.depth_stride);
-        let (mut top, mut bottom) = ([[0.0; 2]; LANES], [[0.0; 2]; LANES]);
+        let (mut d00, mut d10, mut d01, mut d11) = (ZERO, ZERO, ZERO, ZERO);
         let span = self.depth_stride as usize + 2;
         for i in 0..LANES {
-            [top[i], bottom[i]] = ends(self.depth, first[i] as usize, span);
+            [[d00[i], d10[i]], [d01[i], d11[i]]] = ends(self.depth, first[i] as usize, span);
         }
-        let [d00, d10] = [0, 1].map(|column| each(|i| top[i][column]));
-        let [d01, d11] = [0, 1].map(|column| each(|i| bottom[i][column]));
         let per_m = 1.0 / frame.near_m;
         each(|i| {
             let low = lower(lower(d00[i], d10[i]), lower(d01[i], d11[i]));
@@ -86,7 +84,8 @@ impl IdealOnHost<'_> {
             if !is_taken(i) {
                 continue;
             }
-            let [top, bottom] = ends(self.color, CHANNELS * first[i] as usize, span).map(|halves| vectors.numbers(halves));
+            let [top, bottom] = ends(self.color, CHANNELS * first[i] as usize, span);
+            let (top, bottom) = (vectors.numbers(top), vectors.numbers(bottom));
             for k in 0..2 * CHANNELS {
                 let between = t.y[i].mul_add(bottom[k] - top[k], top[k]);
                 // Left texels come first.

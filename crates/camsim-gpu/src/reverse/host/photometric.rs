@@ -2,7 +2,7 @@
 
 use camsim_core::noise::{NOISE_STREAM, SEGMENTS, pcg4d};
 
-use crate::host::lanes::{LANES, Lanes, ZERO, each};
+use crate::host::lanes::{LANES, Lanes, ZERO, each, within};
 use crate::layout::FrameUniforms;
 
 /// Weights of the luminance.
@@ -17,7 +17,8 @@ pub(super) fn photometric(
     colors: &[[f32; 4]; LANES],
     weight: &Lanes,
 ) -> [Lanes; 3] {
-    let mut values = [0, 1, 2].map(|channel| each(|i| colors[i][channel]));
+    // One by one, here and below: what `map` calls may be compiled without the vectors that this is.
+    let mut values = [each(|i| colors[i][0]), each(|i| colors[i][1]), each(|i| colors[i][2])];
     let is_mono = frame.mono == 1;
     if is_mono {
         let [r, g, b] = &values;
@@ -28,14 +29,10 @@ pub(super) fn photometric(
         let normals = normals(frame, segments, x, y, if is_mono { 1 } else { 3 });
         noise = if is_mono { [normals[0]; 3] } else { normals };
     }
-    [0, 1, 2].map(|channel| {
-        let (value, noise) = (&values[channel], &noise[channel]);
-        each(|i| {
-            let value = value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i];
-            let positive = if value > 0.0 { value } else { 0.0 };
-            if positive < 1.0 { positive } else { 1.0 }
-        })
-    })
+    for (value, noise) in values.iter_mut().zip(&noise) {
+        *value = each(|i| within(value[i] * (weight[i] * frame.light) + frame.noise_sigma * noise[i], 1.0));
+    }
+    values
 }
 
 /// Independent standard normals, for each pixel of a row from `x` on: the first `channels` of three.

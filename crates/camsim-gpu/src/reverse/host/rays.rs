@@ -48,6 +48,7 @@ pub(super) fn rays(frame: &FrameUniforms, map: Option<&LensMapOnHost>, x: u32, y
 }
 
 /// Sides of the pixels in the ideal frame.
+#[inline(always)]
 pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMapOnHost>, x: u32, y: u32) -> [Lanes2; 2] {
     let Some(map) = map else {
         let [fx, fy] = [0, 1].map(|axis| frame.ideal_focal_px[axis] / frame.focal_px[axis]);
@@ -60,7 +61,7 @@ pub(super) fn sides(frame: &FrameUniforms, map: Option<&LensMapOnHost>, x: u32, 
             [side.x[i], side.y[i]] = difference(frame.size_px, map, pixel, axis);
         }
     }
-    sides.map(|side| scaled(&side, frame.ideal_focal_px))
+    [scaled(&sides[0], frame.ideal_focal_px), scaled(&sides[1], frame.ideal_focal_px)]
 }
 
 /// One-sided or central difference of the map along an axis, over valid texels only.

@@ -22,14 +22,15 @@ impl Reads<'_> {
         let in_key = self.ideal.inverse_depth(self.frame, &at_px);
         let in_line = self.on_line(uv, mid, &in_key);
         let point = self.reference(&at_px, &in_key);
-        let [north, east, down] = [0, 1, 2].map(|axis| {
+        let along = |axis: usize| {
             let frame = self.frame;
             let [x, y, z] = [frame.ned_from_key_x[axis], frame.ned_from_key_y[axis], frame.ned_from_key_z[axis]];
             each(|i| {
-                let p = [point.ray.x[i], point.ray.y[i], point.ray.z[i]].map(|part| part / point.inverse_depth[i]);
-                frame.key_position_ned_m[axis] + p[0] * x + p[1] * y + p[2] * z
+                let far = 1.0 / point.inverse_depth[i];
+                frame.key_position_ned_m[axis] + point.ray.x[i] * far * x + point.ray.y[i] * far * y + point.ray.z[i] * far * z
             })
-        });
+        };
+        let (north, east, down) = (along(0), along(1), along(2));
         for (i, truth) in truth.iter_mut().enumerate() {
             if inside[i] == 0.0 {
                 *truth = Truth::default();
