@@ -25,6 +25,8 @@ pub(super) struct Look<'a> {
     pub reach: Arc<LensReach>,
     /// The ideal frame that others are made from too, if this one is to be.
     pub common: Option<&'a sharing::Common>,
+    /// Whether half of the probes look: neighbours have the others.
+    has_half: bool,
     /// What is asked of the way in which it is sampled.
     pub asked: sharing::Asked,
     /// The key instant, the camera's pose and twist then.
@@ -52,10 +54,19 @@ pub(super) struct Scenery<'a> {
 impl Planner {
     /// Looks at a frame, by itself or from an ideal frame that others are made from too.
     pub(super) fn look<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>) -> Result<Look<'a>, PlanError> {
+        self.look_with(frame, common, common.is_some())
+    }
+
+    /// Looks at a frame by itself as those of a group are looked at, to be compared with them.
+    pub(super) fn look_as_in_group(&self, frame: u64) -> Result<Look<'_>, PlanError> {
+        self.look_with(frame, None, true)
+    }
+
+    fn look_with<'a>(&'a self, frame: u64, common: Option<&'a sharing::Common>, has_half: bool) -> Result<Look<'a>, PlanError> {
         let stamp_s = self.stamp_s(frame);
         let zoom = self.zoom.as_ref().map(|_| zoom_at(&self.sequence.zoom_track, stamp_s));
-        let of_group = common.and_then(|_| self.half_the_probes(frame));
-        let reach = match (&of_group.or_else(|| self.fixed.clone()), &self.zoom, zoom) {
+        let half = if has_half { self.half_the_probes(frame) } else { None };
+        let reach = match (&half.or_else(|| self.fixed.clone()), &self.zoom, zoom) {
             (Some(reach), ..) => reach.clone(),
             (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
             _ => return Err(PlanError::NoRay),
@@ -69,7 +80,7 @@ impl Planner {
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(&self.sequence.scenario.quality);
         let asked = sharing::Asked::default();
-        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, asked, key_s, key_pose, key_twist, demanded })
+        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, has_half, asked, key_s, key_pose, key_twist, demanded })
     }
 }
 
@@ -173,7 +184,8 @@ impl<'a> Look<'a> {
         let least_share = truths.share_apart(|probe| around[probe].is_beside);
         let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
         let outlook = |around: &[contours::Around]| contours::Outlook::new(around, &reach.camera, key_pose, holes, sky_strips, least_share);
-        Some(match self.common.and_then(|_| self.around_other_half()) {
+        let others = if self.has_half { self.around_other_half() } else { None };
+        Some(match others {
             Some(others) => outlook(&[&around[..], &others].concat()),
             None => outlook(&around),
         })
@@ -184,7 +196,7 @@ impl<'a> Look<'a> {
         let Planner { sequence, shutter, surfaces, around, around_by_half, .. } = self.planner;
         let gain = &prospect::gain(sequence, &reach.camera);
         let search = contours::Search { reach, surfaces, path: self.path(), shutter, stamp_s: self.planner.stamp_s(frame), gain };
-        let known = if self.common.is_some() { around_by_half } else { around };
+        let known = if self.has_half { around_by_half } else { around };
         known.of(frame, || search.look_around())
     }
 

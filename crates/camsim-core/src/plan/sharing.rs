@@ -193,7 +193,7 @@ impl Planner {
         }
     }
 
-    /// A fault of its middle frame is that frame's own: the others are then planned by themselves, and so is it, when it is asked for.
+    /// Sharing is compared with what the middle frame would do by itself. A fault of that frame is its own: the others are then planned by themselves, and so is it, when it is asked for.
     fn group(&self, number: u64) -> Group {
         let size = u64::from(self.sequence.scenario.quality.frames_per_ideal);
         let first = number * size;
@@ -201,13 +201,9 @@ impl Planner {
         let mut plans = vec![None; (frames.end - first) as usize];
         if frames.end - first > 1 {
             let middle = (first + frames.end) / 2;
-            if let Ok(own) = self.plan_alone(middle) {
-                if !own.edges.has_rays() {
-                    plans = self.share(frames, &own);
-                }
-                if let Some(place) = plans.get_mut((middle - first) as usize) {
-                    place.get_or_insert(own);
-                }
+            let own = self.look_as_in_group(middle).and_then(|look| self.plan_of(&look, &look.scenery()));
+            if let Some(own) = own.ok().filter(|own| !own.edges.has_rays()) {
+                plans = self.share(frames, &own);
             }
         }
         Group { first, plans }
