@@ -149,7 +149,8 @@ impl<'a> Facing<'a> {
     /// more than 2 r times its longest side keeps its turn, then: that side is longer than 4 r, so that the square adds little. It is so if
     /// focal |n . a| > 4 r side far^2.
     pub fn is_away(&self, triangle: [u32; 3]) -> bool {
-        let [a, b, c] = triangle.map(|vertex| Vec3::from(self.vertices[vertex as usize].offset_m).as_dvec3() - self.camera_from_centre_m);
+        let corner = |k: usize| Vec3::from(self.vertices[triangle[k] as usize].offset_m).as_dvec3() - self.camera_from_centre_m;
+        let (a, b, c) = (corner(0), corner(1), corner(2));
         let normal = (b - a).cross(c - a);
         // Of the normal and the way from the camera, one goes down and the other up.
         let from_below = normal.dot(a) * normal.z < 0.0;

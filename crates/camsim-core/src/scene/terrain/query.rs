@@ -121,7 +121,8 @@ impl Terrain {
         let mut best = None;
         let mut limit = t_max;
         for corners in cell_triangles(cell) {
-            let points = corners.map(|[i, j]| self.position_ned_m(chunk_index, i, j));
+            let point = |k: usize| self.position_ned_m(chunk_index, corners[k][0], corners[k][1]);
+            let points = [point(0), point(1), point(2)];
             let Some((t, weights)) = intersect_triangle(points, origin, direction, limit) else { continue };
             limit = t;
             let uvs = corners.map(|[i, j]| self.vertices[(chunk.first_vertex + j * (chunk.cells[0] + 1) + i) as usize].uv);
@@ -157,8 +158,8 @@ fn passes(corners: [DVec2; 4]) -> bool {
 pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
     /// 18 products and sums at most, of eps / 2 each, and some reserve.
     const ROUNDING: f64 = 4e-15;
-    let [a, b, c] = points.map(|p| p - origin);
-    let [wa, wb, wc] = [c.cross(b), a.cross(c), b.cross(a)].map(|n| direction.dot(n));
+    let (a, b, c) = (points[0] - origin, points[1] - origin, points[2] - origin);
+    let (wa, wb, wc) = (direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a)));
     let sum = wa + wb + wc;
     let reach = a.abs().max(b.abs()).max(c.abs()).max_element();
     let slack = ROUNDING * reach * reach * direction.abs().max_element();
