@@ -11,6 +11,7 @@ use anyhow::anyhow;
 use camsim_core::{frame::RenderedFrame, plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
 use camsim_gpu::engine::Finished;
 use camsim_io::{
+    inputs,
     manifest::{ResumeError, RunManifest, check_resume, in_shard},
     write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
 };
@@ -74,7 +75,8 @@ pub fn run(
 ) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
     let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
-    check_folder(job, console)?;
+    let inputs = inputs::of_scenario(scenario);
+    check_folder(job, &inputs, console)?;
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // What cannot be planned is refused before anything is written.
@@ -91,6 +93,7 @@ pub fn run(
         adapter: source.adapter(),
         seed: scenario.seed,
         scenario: scenario.clone(),
+        inputs,
         frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
         shard: job.shard.map(|shard| shard.0),
         written: 0,
@@ -154,11 +157,11 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 }
 
 /// Frames of another scenario are never taken for this one's; without `--resume` they are only worth a warning.
-fn check_folder(job: &Job<'_>, console: &mut Console<'_>) -> Result<(), Failure> {
-    match check_resume(job.folder, &job.sequence.scenario) {
+fn check_folder(job: &Job<'_>, inputs: &inputs::Inputs, console: &mut Console<'_>) -> Result<(), Failure> {
+    match check_resume(job.folder, &job.sequence.scenario, inputs) {
         Err(error) if job.resume => Err(Failure::bad_input(error)),
-        Err(ResumeError::Differs { path, .. }) => {
-            console.warn(format_args!("{} is of another scenario: files of the same name are replaced, others stay", path.display()));
+        Err(ResumeError::Differs { path, made, .. }) => {
+            console.warn(format_args!("{} was made {made}: files of the same name are replaced, others stay", path.display()));
             Ok(())
         }
         _ => Ok(()),

@@ -467,6 +467,13 @@ fn a_folder_of_pictures_goes_through_the_camera() {
 
     let (code, _, err) = apply(&["--resume", "--seed", "3"]);
     assert!(code == 2 && err.contains("seed was 0, now 3"), "{err}");
+    // Nor is a picture that has changed since taken for what it was.
+    let picture = file("rgb/1.5.png");
+    let was = fs::read(&picture).unwrap();
+    fs::write(&picture, [&was[..], b"more"].concat()).unwrap();
+    let (code, _, err) = apply(&["--resume"]);
+    assert!(code == 2 && err.contains("from other inputs: pictures.") && err.contains("rgb/1.5.png"), "{err}");
+    fs::write(&picture, was).unwrap();
     let (code, _, err) = apply(&["--frames", "3..9"]);
     assert!(code == 2 && err.contains("names frames 0 to 3"), "{err}");
     let (code, _, err) = camsim(["apply", text(&camera), text(&frames), "-o", text(&file("p.png"))]);

@@ -61,6 +61,39 @@ fn shards_and_resumption_give_the_bytes_of_one_run() {
     assert!(code == 2 && err.contains("seed"), "{err}");
 }
 
+/// Nor is the same scenario with something else in one of its files.
+#[test]
+fn a_file_that_has_changed_is_told_by_resuming() {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets");
+    let temporary = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(assets.join("pattern.toml")).unwrap();
+    let log = text.lines().find_map(|line| line.strip_prefix("log = ")).unwrap().trim_matches('"').to_owned();
+    for name in ["pattern.toml", &log, "acircles.png"] {
+        fs::copy(assets.join(name), temporary.path().join(name)).unwrap();
+    }
+    let (scenario, folder) = (temporary.path().join("pattern.toml"), temporary.path().join("out"));
+    let render = |more: &[&str]| {
+        let common = ["render", scenario.to_str().unwrap(), "-o", folder.to_str().unwrap(), "--backend", "reference", "--outputs", "rows"];
+        let small =
+            ["--set", "camera.size_px=[24, 18]", "--set", "camera.focal_px=[16, 16]", "--set", "camera.principal_point_px=[11.5, 8.5]"];
+        camsim(&[&common[..], &small, more].concat())
+    };
+    let (code, _, err) = render(&["--frames", "2"]);
+    assert_eq!(code, 0, "{err}");
+    let (code, out, err) = render(&["--frames", "2..4", "--resume"]);
+    assert!(code == 0 && out.starts_with("1 frames (1 were there already)"), "{out}{err}");
+
+    let log = temporary.path().join(log);
+    let rows = fs::read_to_string(&log).unwrap();
+    fs::write(&log, rows.replace('1', "2")).unwrap();
+    let (before, kept) = (bytes(&folder, "frames.csv"), bytes(&folder, "run.json"));
+    let (code, _, err) = render(&["--frames", "2..5", "--resume"]);
+    assert!(code == 2 && err.contains("when a file had something else in it") && err.contains(log.to_str().unwrap()), "{err}");
+    assert_eq!((bytes(&folder, "frames.csv"), bytes(&folder, "run.json")), (before, kept), "nothing is touched");
+    fs::write(&log, rows).unwrap();
+    assert_eq!(render(&["--frames", "2..5", "--resume"]).0, 0);
+}
+
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn timing_runs_write_no_frame() {

@@ -25,6 +25,7 @@ mod source;
 use material::Materials;
 use pose::Pose;
 use source::Source;
+pub(crate) use source::files_beside;
 
 /// Why a model cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -76,6 +77,8 @@ pub struct Model {
     parts: Vec<Part>,
     /// What of the file is not shown, or not as it is meant.
     pub notes: Vec<String>,
+    /// No point is farther from its origin.
+    pub reach_m: f64,
 }
 
 #[derive(Clone, Debug)]
@@ -91,7 +94,7 @@ const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec
 /// Parts of a scene, at most: a slip in a number must not fill the memory.
 const MOST_PARTS: usize = 1 << 20;
 /// No point of a model is farther from its origin, metres: what claims to be is a slip in a number.
-const FARTHEST_M: f64 = 1e9;
+pub(crate) const FARTHEST_M: f64 = 1e9;
 /// Nodes within nodes, at most.
 const DEEPEST: usize = 1024;
 
@@ -132,7 +135,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     else {
         return match options.scene {
             Some(n) => Err(broken(format!("has no scene {n}; the last one is {}", document.scenes().count() as i64 - 1))),
-            None => Ok(Model { parts: Vec::new(), notes: vec!["has no scene: nothing of it is shown".into()] }),
+            None => Ok(Model { parts: Vec::new(), notes: vec!["has no scene: nothing of it is shown".into()], reach_m: 0.0 }),
         };
     };
     let mut reader = Reader {
@@ -144,18 +147,19 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         parts: Vec::new(),
         met: HashSet::new(),
         notes: Vec::new(),
+        reach_m: 0.0,
     };
     for node in scene.nodes() {
         reader.node(&node, DAffine3::IDENTITY, 0)?;
     }
-    let Reader { parts, mut notes, materials, .. } = reader;
+    let Reader { parts, mut notes, materials, reach_m, .. } = reader;
     if parts.is_empty() {
         notes.push("has no triangles: nothing of it is shown".into());
     }
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();
-    Ok(Model { parts, notes })
+    Ok(Model { parts, notes, reach_m })
 }
 
 struct Reader<'a> {
@@ -169,6 +173,8 @@ struct Reader<'a> {
     /// Nodes that have been met: a tree comes by each of them once.
     met: HashSet<usize>,
     notes: Vec<String>,
+    /// No point so far is farther from the model's origin.
+    reach_m: f64,
 }
 
 impl Reader<'_> {
@@ -251,6 +257,7 @@ impl Reader<'_> {
                      positions, and translation, rotation and scale of its nodes"
                 )));
             }
+            self.reach_m = self.reach_m.max(reach_m);
             if !shape.indices.is_empty() {
                 let material = self.materials.on(&shape, material);
                 self.parts.push(Part { shape, material, model_from_shape });

@@ -26,6 +26,8 @@ pub mod builtin;
 
 pub mod write;
 
+pub mod inputs;
+
 pub mod manifest;
 
 pub mod compare;

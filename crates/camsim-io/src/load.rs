@@ -15,7 +15,7 @@ use glam::DVec2;
 use crate::{
     board_file::BoardFileError,
     flight_log::{FlightLogError, read_flight_log},
-    gltf_file::GltfError,
+    gltf_file::{FARTHEST_M, GltfError},
     pictures::{PictureError, read_gray_image},
     terrain::{TerrainFileError, TerrainSummary},
 };
@@ -84,6 +84,16 @@ pub enum LoadError {
         north_m: f64,
         /// The place.
         east_m: f64,
+    },
+    /// A model farther away than anything can be.
+    #[error(
+        "scene.gltf: {file} reaches {reach_m:.1e} m from the local frame's origin, more than {FARTHEST_M:.0e}: check its place and scale"
+    )]
+    TooFar {
+        /// The model.
+        file: PathBuf,
+        /// How far.
+        reach_m: f64,
     },
     /// A calibration board.
     #[error("scene.board: {0}")]

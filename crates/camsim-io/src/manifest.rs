@@ -7,7 +7,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::write::{WriteError, write_atomic};
+use crate::{
+    inputs::Inputs,
+    write::{WriteError, write_atomic},
+};
 
 /// Contents of `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,6 +23,8 @@ pub struct RunManifest {
     pub seed: u64,
     /// The scenario with all defaults, `--set` and paths resolved.
     pub scenario: Scenario,
+    /// What was in the files that it names.
+    pub inputs: Inputs,
     /// Frames that the run covers, `--frames` applied: first and one past the last.
     pub frames: [u64; 2],
     /// `[I, N]` of `--shard I/N`, from 1.
@@ -53,12 +58,14 @@ pub enum ResumeError {
         /// The parser's words.
         message: String,
     },
-    /// Other scenario.
-    #[error("{} was made by another scenario: {}; render without --resume, or into another folder", path.display(), shortened(differences))]
+    /// Another scenario, or other files.
+    #[error("{} was made {made}: {}; render without --resume, or into another folder", path.display(), shortened(differences))]
     Differs {
         /// The file.
         path: PathBuf,
-        /// `key: old there, new here`.
+        /// By what, or from what.
+        made: &'static str,
+        /// `key was old, now new`.
         differences: Vec<String>,
     },
 }
@@ -88,19 +95,20 @@ fn shortened(differences: &[String]) -> String {
     if more > 0 { format!("{listed}; and {more} more") } else { listed }
 }
 
-/// Whether frames already in `folder` belong to `scenario`. A folder without `run.json` holds none: `Ok(false)`.
+/// Whether frames already in `folder` belong to `scenario` and to what is in its files. A folder without `run.json` holds none: `Ok(false)`.
 ///
 /// # Errors
-/// `run.json` cannot be read, or another scenario made it.
-pub fn check_resume(folder: &Path, scenario: &Scenario) -> Result<bool, ResumeError> {
-    check_resume_of(folder, "scenario", scenario)
+/// `run.json` cannot be read, or another scenario made it, or the same with other files.
+pub fn check_resume(folder: &Path, scenario: &Scenario, inputs: &Inputs) -> Result<bool, ResumeError> {
+    Ok(check_resume_of(folder, "scenario", "by another scenario", scenario)?
+        && check_resume_of(folder, "inputs", "when a file had something else in it", inputs)?)
 }
 
-/// As [`check_resume`], of whatever stands under `key` in `run.json`.
+/// As [`check_resume`], of whatever stands under `key` in `run.json`; `made` is how the folder was made if that differs.
 ///
 /// # Errors
 /// As [`check_resume`].
-pub fn check_resume_of(folder: &Path, key: &str, here: &impl Serialize) -> Result<bool, ResumeError> {
+pub fn check_resume_of(folder: &Path, key: &str, made: &'static str, here: &impl Serialize) -> Result<bool, ResumeError> {
     let path = folder.join("run.json");
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
@@ -114,7 +122,7 @@ pub fn check_resume_of(folder: &Path, key: &str, here: &impl Serialize) -> Resul
     let here: Value = serde_json::to_string(here).and_then(|text| serde_json::from_str(&text)).map_err(parse)?;
     let mut differences = Vec::new();
     compare(there, &here, "", &mut differences);
-    if differences.is_empty() { Ok(true) } else { Err(ResumeError::Differs { path, differences }) }
+    if differences.is_empty() { Ok(true) } else { Err(ResumeError::Differs { path, made, differences }) }
 }
 
 fn compare(there: &Value, here: &Value, key: &str, differences: &mut Vec<String>) {
@@ -152,6 +160,7 @@ mod tests {
             adapter: "llvmpipe".into(),
             seed: scenario.seed,
             scenario,
+            inputs: [("a.csv".to_owned(), "3 bytes".to_owned())].into(),
             frames: [0, 10],
             shard: Some([2, 4]),
             written: 3,
@@ -164,21 +173,24 @@ mod tests {
     #[test]
     fn a_manifest_reads_back_and_only_its_own_scenario_resumes() {
         let dir = tempfile::tempdir().unwrap();
-        assert!(!check_resume(dir.path(), &scenario(&[])).unwrap());
+        assert!(!check_resume(dir.path(), &scenario(&[]), &Inputs::new()).unwrap());
         let ours = manifest(scenario(&[("camera.fps", "29.97"), ("camera.mount.angles_deg", "[0.1, -0.3, 1e-7]")]));
         ours.write(dir.path()).unwrap();
         let text = std::fs::read_to_string(dir.path().join("run.2-of-4.json")).unwrap();
         assert_eq!(serde_json::from_str::<RunManifest>(&text).unwrap(), ours);
-        assert!(check_resume(dir.path(), &ours.scenario).unwrap());
+        assert!(check_resume(dir.path(), &ours.scenario, &ours.inputs).unwrap());
+        let changed = [("a.csv".to_owned(), "4 bytes".to_owned())].into();
+        let error = check_resume(dir.path(), &ours.scenario, &changed).unwrap_err().to_string();
+        assert!(error.contains("a.csv was \"3 bytes\", now \"4 bytes\""), "{error}");
 
         let mut other = ours.scenario.clone();
         other.camera.fps = 25.0;
         other.scene.fog_visibility_m = Some(900.0);
-        let error = check_resume(dir.path(), &other).unwrap_err().to_string();
+        let error = check_resume(dir.path(), &other, &ours.inputs).unwrap_err().to_string();
         assert!(error.contains("camera.fps was 29.97, now 25") && error.contains("scene.fog_visibility_m was nothing, now 900"), "{error}");
 
         std::fs::write(dir.path().join("run.json"), "{").unwrap();
-        assert!(matches!(check_resume(dir.path(), &other), Err(ResumeError::Parse { .. })));
+        assert!(matches!(check_resume(dir.path(), &other, &ours.inputs), Err(ResumeError::Parse { .. })));
     }
 
     #[test]

@@ -23,6 +23,8 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::pictures::PictureError;
+pub(crate) use georeference::world_files;
+
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
 use ortho::{Ortho, OrthoPlace};
 

@@ -63,6 +63,8 @@ fn what_cannot_stand_is_named() {
         ("gltf = [{ file = \"model.gltf\", scene = 3 }]", "has no scene 3"),
         ("gltf = [{ file = \"model.gltf\", animation = 3, time_s = 1.0 }]", "has no animation 3"),
         ("gltf = [{ at = [1, 2, 3] }]", "file: is missing"),
+        ("gltf = [{ file = \"model.gltf\", scale = 1e12 }]", "model.gltf reaches 8.7e11 m from the local frame's origin"),
+        ("gltf = [{ file = \"model.gltf\", at = [1e300, 0, 0] }]", "check its place and scale"),
     ] {
         let error = load(folder.path(), LOCAL, scene).unwrap_err();
         assert!(error.contains(wanted), "{error}");

@@ -165,7 +165,9 @@ impl PoseTrack {
                 return fail("has a value that is not finite; leave the row out");
             }
             if (norm - 1.0).abs() > 0.01 {
-                return fail("has a quaternion that is not of unit length; the columns are t_s,x,y,z,qw,qx,qy,qz");
+                return fail(
+                    "has a quaternion that is not of unit length; its columns are qw,qx,qy,qz by name, and in TUM's order, which has no names, qx qy qz qw",
+                );
             }
             if row.t_s <= before {
                 return fail("is not later than the row before; sort by time and leave doubles out");

@@ -70,6 +70,15 @@ impl FrameSet {
         1e-3 * self.spec.instant_ms
     }
 
+    /// The table of poses or the flow that says how the camera moves, if one does.
+    #[must_use]
+    pub fn motion_file(&self) -> Option<&Path> {
+        match &self.moves {
+            Moves::Twist(_) => None,
+            Moves::Flow(path) | Moves::Poses { table: path, .. } => Some(path),
+        }
+    }
+
     /// Whether the file names a folder or a table of frames, which may hold a single one.
     #[must_use]
     pub fn is_several(&self) -> bool {

@@ -24,9 +24,7 @@ impl Source {
             return Err(broken("is empty".into()));
         }
         let (text, blob) = if bytes.starts_with(b"glTF") { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
-        // A byte order mark is not allowed, and editors write it nevertheless.
-        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-        let mut json: Value = serde_json::from_slice(text).map_err(|error| broken(format!("is no glTF: {error}")))?;
+        let mut json: Value = serde_json::from_slice(without_mark(text)).map_err(|error| broken(format!("is no glTF: {error}")))?;
         checks::check_extensions(path, &json)?;
         if let Some(root) = json.as_object_mut() {
             root.remove("extensionsRequired");
@@ -141,9 +139,29 @@ fn fetch(path: &Path, uri: &str, key: &str) -> Result<Vec<u8>, GltfError> {
     if uri.contains("://") {
         return Err(broken("lies on another machine: put it beside the file"));
     }
-    let name = percent_decoded(uri).filter(|name| !name.is_empty()).ok_or_else(|| broken("its uri is no name of a file"))?;
-    let beside = path.with_file_name("").join(name);
+    let beside = beside(path, uri).ok_or_else(|| broken("its uri is no name of a file"))?;
     std::fs::read(&beside).map_err(|error| broken(&format!("its file {} cannot be read: {error}; put it there", beside.display())))
+}
+
+/// The file that a URI names.
+fn beside(path: &Path, uri: &str) -> Option<PathBuf> {
+    let name = percent_decoded(uri).filter(|name| !name.is_empty())?;
+    Some(path.with_file_name("").join(name))
+}
+
+/// Files beside a model that it names, as far as it can be read.
+pub fn files_beside(path: &Path) -> Vec<PathBuf> {
+    let Ok(bytes) = read_file(path) else { return Vec::new() };
+    let text = if bytes.starts_with(b"glTF") { split_glb(&bytes).map_or(&[][..], |(text, _)| text) } else { &bytes[..] };
+    let Ok(json) = serde_json::from_slice::<Value>(without_mark(text)) else { return Vec::new() };
+    let lists = ["buffers", "images"].into_iter().filter_map(|key| json.get(key)?.as_array());
+    let uris = lists.flatten().filter_map(|of| of.get("uri")?.as_str());
+    uris.filter(|uri| !uri.starts_with("data:") && !uri.contains("://")).filter_map(|uri| beside(path, uri)).collect()
+}
+
+/// A byte order mark is not allowed, and editors write it nevertheless.
+fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
 fn base64(text: &[u8]) -> Option<Vec<u8>> {

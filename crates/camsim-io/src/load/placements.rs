@@ -32,6 +32,10 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
     if let Some(name) = header.iter().find(|name| !known.contains(&name.trim_start_matches('\u{feff}'))) {
         return Err(fail(format!("line 1: the column `{name}` says nothing here; {COLUMNS}")));
     }
+    if let Some(name) = known.into_iter().find(|name| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}') == *name).count() > 1)
+    {
+        return Err(fail(format!("line 1: there are two columns `{name}`; leave one out")));
+    }
     let column = |name: &str| header.iter().position(|cell| cell.trim_start_matches('\u{feff}') == name);
     let local = [column("n_m"), column("e_m"), column("d_m")];
     let earth = [column("lat_deg"), column("lon_deg"), column("height_m")];
@@ -56,6 +60,11 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
             true => (PatternCentre::Ned(triple(local)?), None),
             false => (PatternCentre::Origin, Some(triple(earth)?)),
         };
+        if let Some([lat_deg, lon_deg, _]) = place.1.filter(|[lat_deg, lon_deg, _]| lat_deg.abs() > 90.0 || lon_deg.abs() > 360.0) {
+            return Err(fail(format!(
+                "line {line}: latitude {lat_deg}, longitude {lon_deg} are no place on Earth; both are degrees, latitude -90 to 90"
+            )));
+        }
         let scale = number(column("scale"), 1.0)?;
         if scale <= 0.0 {
             return Err(fail(format!("line {line}: the scale is {scale}, not above 0")));
@@ -95,6 +104,9 @@ mod tests {
             ("n_m,e_m\n1,2\n", false, "line 1: places are missing"),
             ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
             ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
+            ("n_m,e_m,d_m,n_m\n1,2,3,4\n", false, "line 1: there are two columns `n_m`"),
+            ("lat_deg,lon_deg\n47,8\n147,8\n", true, "line 3: latitude 147, longitude 8 are no place on Earth"),
+            ("lat_deg,lon_deg\n47,999\n", true, "line 2: latitude 47, longitude 999"),
             ("n_m,e_m\n1,x\n", true, "line 2: `x` is no finite number"),
             ("n_m,e_m,scale\n1,2,1\n1,2,0\n", true, "line 3: the scale is 0"),
             ("n_m,e_m\n", true, "has no row"),

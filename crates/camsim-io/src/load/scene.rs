@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     board_file::read_board,
-    gltf_file::{GltfOptions, read_gltf},
+    gltf_file::{FARTHEST_M, GltfOptions, read_gltf},
     pictures::read_texture,
     terrain::{HeightShift, TerrainSummary, read_terrain_in_light},
 };
@@ -106,6 +106,10 @@ fn add_model(scenario: &Scenario, log: &FlightLog, spec: &GltfSpec, scene: &mut 
                 continue;
             };
             at_ned_m.z = ground_down_m;
+        }
+        let reach_m = at_ned_m.length() + model.reach_m * spec.scale * scale;
+        if reach_m.is_nan() || reach_m > FARTHEST_M {
+            return Err(LoadError::TooFar { file: spec.file.clone(), reach_m });
         }
         scene.meshes.extend(model.place(at_ned_m, (spec.heading_deg + heading_deg).to_radians(), spec.scale * scale));
     }

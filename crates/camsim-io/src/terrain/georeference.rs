@@ -64,9 +64,14 @@ pub(super) fn world_file_names(path: &Path) -> Vec<PathBuf> {
     extensions.into_iter().map(|extension| path.with_extension(extension)).collect()
 }
 
+/// World files beside a picture.
+pub(crate) fn world_files(path: &Path) -> impl Iterator<Item = PathBuf> {
+    world_file_names(path).into_iter().filter(|name| name.is_file())
+}
+
 /// The world file beside a picture, if there is one. Its origin is the centre of the top-left pixel.
 pub(super) fn world_file(path: &Path) -> Result<Option<Affine>, TerrainFileError> {
-    let Some(path) = world_file_names(path).into_iter().find(|name| name.is_file()) else { return Ok(None) };
+    let Some(path) = world_files(path).next() else { return Ok(None) };
     let error = |reason: String| TerrainFileError::WorldFile { path: path.clone(), reason };
     let text = std::fs::read_to_string(&path).map_err(|e| error(e.to_string()))?;
     let values = text

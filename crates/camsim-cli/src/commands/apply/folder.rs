@@ -1,6 +1,6 @@
 //! `camsim apply` on many frames: one after the other, into a folder.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use anyhow::anyhow;
 use camsim_core::{
@@ -10,7 +10,8 @@ use camsim_core::{
     shutter::Shutter,
 };
 use camsim_io::{
-    frame_file::FrameSet,
+    frame_file::{FrameSet, list::Entry},
+    inputs,
     manifest::{ResumeError, check_resume_of},
     write::{FrameFiles, FrameWriter, camera_toml, write_atomic},
 };
@@ -48,7 +49,9 @@ struct Inputs<'a> {
     blur_samples: Option<u32>,
     seed: u64,
     frame_number: u64,
-    /// Pictures and stamp of each frame.
+    /// What is in the files that are the same for all frames.
+    files: inputs::Inputs,
+    /// Pictures and stamp of each frame, and when the pictures were changed.
     pictures: BTreeMap<String, String>,
 }
 
@@ -81,7 +84,7 @@ pub(super) fn run(
     check_motion(args, spec, set, &frames)?;
     tell_gaps(args, spec, set, &frames, console)?;
     let inputs = inputs(args, spec, set)?;
-    match check_resume_of(folder, "apply", &inputs) {
+    match check_resume_of(folder, "apply", "from other inputs", &inputs) {
         Err(error) if args.resume => return Err(Failure::bad_input(error)),
         Err(ResumeError::Differs { path, .. } | ResumeError::Parse { path, .. }) => {
             console.warn(format_args!("{} is of other inputs: files of the same name are replaced, others stay", path.display()));
@@ -184,8 +187,9 @@ fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) 
 }
 
 fn inputs<'a>(args: &Args, spec: &'a CameraSpec, set: &FrameSet) -> Result<Inputs<'a>, Failure> {
-    let text = |path: &std::path::Path| path.display().to_string();
-    let picture = |entry: &camsim_io::frame_file::list::Entry| {
+    // Pictures are too many to be read for it.
+    let text = |path: &Path| format!("{} ({})", path.display(), inputs::dated(path));
+    let picture = |entry: &Entry| {
         let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
         format!("{}, {}, {stamp}", text(&entry.color), entry.depth.as_deref().map_or("no depth".to_owned(), text))
     };
@@ -197,6 +201,7 @@ fn inputs<'a>(args: &Args, spec: &'a CameraSpec, set: &FrameSet) -> Result<Input
         blur_samples: args.blur_samples,
         seed: args.seed,
         frame_number: args.frame_number,
+        files: inputs::of_files(set.motion_file().into_iter().chain(spec.photometric.vignette.as_deref()).map(Path::to_owned).collect()),
         pictures: set.entries().iter().enumerate().map(|(index, entry)| (format!("{index:06}"), picture(entry))).collect(),
     })
 }
