@@ -75,6 +75,8 @@ pub(super) struct LevelOfDetail {
     /// Bound on how far the drawn terrain is from the full one, px of the ideal frame.
     pub(super) max_error_px: f64,
     pub(super) tolerance_px: f64,
+    /// How far depth may be off for it where the camera looks straight down, as a share of it.
+    pub(super) depth_share: f64,
     /// What the device holds of its triangles.
     pub(super) triangle_bytes: u64,
 }
@@ -164,9 +166,10 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if let Some(part) = part_of_host(&loaded.sequence, &plan) {
         console.line(format_args!("on a software adapter the host {part} of this frame (`camsim info --help`)"))?;
     }
-    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, triangle_bytes }) = level_of_detail {
+    if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes }) = level_of_detail {
         console.line("terrain in this frame")?;
         console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;
+        console.line(format_args!("  the depth of what is seen from straight above is off by at most {depth_share:.1e} of it"))?;
         if away > 0 {
             console.line(format_args!("  {away} more face away and are not drawn: from above they are hidden"))?;
         }
@@ -208,7 +211,15 @@ pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<L
     let tolerance_px = plan.terrain_error_px;
     let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
     let (lod, triangle_bytes) = (placed.lod, placed.bytes());
-    Some(LevelOfDetail { triangles: lod.triangles, away: lod.away, max_error_px: lod.max_error_px, tolerance_px, triangle_bytes })
+    let depth_share = tolerance_px / plan.ideal.focal_px.max_element();
+    Some(LevelOfDetail {
+        triangles: lod.triangles,
+        away: lod.away,
+        max_error_px: lod.max_error_px,
+        tolerance_px,
+        depth_share,
+        triangle_bytes,
+    })
 }
 
 fn detail<'a>(terrain: &'a scene::Terrain, plan: &FramePlan) -> TerrainDetail<'a> {

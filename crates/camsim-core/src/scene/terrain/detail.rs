@@ -74,9 +74,10 @@ impl Judge {
     }
 
     /// Largest vertical deviation within a box that moves nothing by more than the tolerance, if points are off by up to `horizontal_m` also
-    /// in the north-east plane.
+    /// in the north-east plane, and that is none either if it is looked at from any side.
     ///
-    /// From `focal (e across + h far) <= tolerance z (z - e |axis_z| - h)`. Each step rounds the way its arguments go, so of two boxes
+    /// From `focal (e across + h far) <= tolerance z (z - e |axis_z| - h)` and `focal e <= tolerance z`: from straight above heights that are off move nothing in the
+    /// picture, but all of it is in the depth. Each step rounds the way its arguments go, so of two boxes
     /// that hold one another the larger never gets the larger tolerance.
     fn tolerance(&self, bounds: &Aabb, horizontal_m: f64) -> u16 {
         if !self.frustum.may_see(bounds) {
@@ -90,7 +91,8 @@ impl Judge {
         let [x, y] = self.across_ned.map(|n| from_camera.support(n).max(from_camera.support(-n)));
         let across_m = (x * x + y * y).sqrt();
         let left_px_m = self.max_error_px * (depth_m - horizontal_m) - self.focal_px * horizontal_m * far_m / depth_m;
-        key_of_tolerance(left_px_m / (self.focal_px * across_m / depth_m + self.max_error_px * self.axis_ned.z.abs()))
+        let in_picture_m = left_px_m / (self.focal_px * across_m / depth_m + self.max_error_px * self.axis_ned.z.abs());
+        key_of_tolerance(in_picture_m.min(self.max_error_px * depth_m / self.focal_px))
     }
 
     /// What horizontal deviations alone move within a box, pixels.
@@ -140,7 +142,8 @@ pub struct TerrainDetail<'a> {
 
 impl<'a> TerrainDetail<'a> {
     /// `tangents` = [u_min, u_max, v_min, v_max] of the ideal frame (u = x/z, v = y/z in the optical frame), `focal_px` its larger focal
-    /// length. Nothing that is seen is moved by more than `max_error_px`; with a tolerance too small for anything it is the full surface.
+    /// length. Nothing that is seen is moved by more than `max_error_px`, and heights are off by no more than that looks from the side, so that from straight above depth is off by
+    /// `max_error_px / focal_px` of it at most; with a tolerance too small for anything it is the full surface.
     pub fn new(terrain: &'a Terrain, camera: &CameraPose, tangents: [f64; 4], focal_px: f64, max_error_px: f64) -> Self {
         let judge = Judge::new(camera, tangents, focal_px, max_error_px);
         let mut in_sight = Vec::new();

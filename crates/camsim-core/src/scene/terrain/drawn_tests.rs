@@ -12,6 +12,8 @@ use super::{
 };
 use crate::pose::CameraPose;
 
+mod depth;
+
 const TANGENTS: [f64; 4] = [-0.7, 0.9, -0.6, 0.5];
 const FOCAL_PX: f64 = 400.0;
 
@@ -245,7 +247,7 @@ fn the_selection_keeps_its_promise() {
         for max_error_px in [0.1, 0.25, 2.0] {
             let mesh = detail(&terrain, &camera, max_error_px);
             assert!(mesh.lod.max_error_px <= max_error_px, "{} > {max_error_px}", mesh.lod.max_error_px);
-            let mut worst = 0.0_f64;
+            let (mut worst, mut worst_from_aside) = (0.0_f64, 0.0_f64);
             for triangle in triangles(&terrain, &mesh) {
                 let corners = triangle.map(|place| vertex_m(&terrain, place));
                 for _ in 0..4 {
@@ -254,13 +256,18 @@ fn the_selection_keeps_its_promise() {
                     let weights = [1.0 - a - b, a, b];
                     let drawn: DVec3 = (0..3).map(|k| weights[k] * corners[k]).sum();
                     let at = [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(triangle[k][axis])).sum());
-                    if let (Some(a), Some(b)) = (seen(&camera, full_m(&terrain, at)), seen(&camera, drawn)) {
+                    let full = full_m(&terrain, at);
+                    if let (Some(a), Some(b)) = (seen(&camera, full), seen(&camera, drawn)) {
                         worst = worst.max(FOCAL_PX * (a[0] - b[0]).hypot(a[1] - b[1]));
+                        let depth_m = (camera.ned_from_camera.inverse() * (full - camera.position_ned_m)).z;
+                        worst_from_aside = worst_from_aside.max(FOCAL_PX * (full.z - drawn.z).abs() / depth_m);
                     }
                 }
             }
             assert!(worst <= mesh.lod.max_error_px + 1e-6, "{worst} > {} px", mesh.lod.max_error_px);
-            // Not only a bound.
+            assert!(worst_from_aside <= max_error_px, "{worst_from_aside} > {max_error_px} px");
+            // Not only bounds.
+            let worst = worst.max(worst_from_aside);
             assert!(mesh.lod.triangles > 50_000 || worst > 0.3 * max_error_px, "{worst} of {max_error_px} px");
         }
     }

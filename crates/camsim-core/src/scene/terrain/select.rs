@@ -101,11 +101,16 @@ impl TerrainDetail<'_> {
         let judged = Judged::new(self, known, hit.chunk);
         let mut waiting = Vec::with_capacity(2 + DEPTHS as usize);
         waiting.extend(ROOTS.map(|root| (root, 0)));
-        while let Some((triangle, depth)) = waiting.pop() {
-            let corners = triangle.map(|vertex| {
+        let places = |triangle: [u32; 3]| {
+            triangle.map(|vertex| {
                 let [i, j] = lattice::place(vertex);
                 [i.min(chunk.cells[0]), j.min(chunk.cells[1])]
-            });
+            })
+        };
+        // One half of a cell may be part of a larger triangle while the other is as it is.
+        let mut is_full = true;
+        while let Some((triangle, depth)) = waiting.pop() {
+            let mut corners = places(triangle);
             let beside = |axis: usize| {
                 let along = corners.map(|corner| corner[axis]);
                 cell[axis] >= along.into_iter().fold(0, u32::max) || cell[axis] < along.into_iter().fold(u32::MAX, u32::min)
@@ -119,10 +124,16 @@ impl TerrainDetail<'_> {
                     waiting.extend(halves.map(|half| (half, depth + 1)));
                     continue;
                 }
-            } else if lattice::cell_to_turn(triangle).is_none_or(|cell| judged.cell(cell).is_needed()) {
-                return DrawnCell { triangles: Vec::new(), ..drawn };
+                is_full = false;
+            } else if let Some(cell) = lattice::cell_to_turn(triangle) {
+                let is_turned = judged.cell(cell).is_needed();
+                is_full &= is_turned;
+                corners = if is_turned { places(lattice::turned(triangle, cell)) } else { corners };
             }
             drawn.triangles.push(corners.map(|[i, j]| self.terrain.position_ned_m(hit.chunk, i, j)));
+        }
+        if is_full {
+            drawn.triangles.clear();
         }
         drawn
     }
