@@ -57,6 +57,10 @@ fn content(path: &Path) -> String {
 }
 
 fn checksum(path: &Path) -> io::Result<(u64, u32)> {
+    // What comes through a pipe has been read, and opening it again would wait for more.
+    if !path.metadata()?.is_file() {
+        return Err(io::ErrorKind::InvalidInput.into());
+    }
     let mut file = File::open(path)?;
     let (mut buffer, mut hasher, mut bytes) = (vec![0; AT_ONCE], crc32fast::Hasher::new(), 0);
     loop {

@@ -1,6 +1,7 @@
 //! What processors have beyond what all of them have. The only place that takes their word for it.
 
-/// Does work by the widest vectors that the processor has, and returns what that gives.
+/// Does work by the widest vectors that the processor has, and returns what that gives. Only what is inlined into it is compiled for these: functions are marked so, and
+/// loops are written out, since closures that arrays' `map` or iterators call mostly stay calls.
 macro_rules! widest {
     ($vectors:ident => $work:expr) => {{
         #[cfg(target_arch = "x86_64")]
