@@ -12,7 +12,7 @@ use camsim_core::{frame::RenderedFrame, plan::Planner, scenario::Scenario, seque
 use camsim_gpu::engine::Finished;
 use camsim_io::{
     inputs,
-    manifest::{ResumeError, RunManifest, check_resume, in_shard},
+    manifest::{ResumeError, RunManifest, check_resume, check_resume_of, in_shard},
     write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
 };
 
@@ -76,7 +76,8 @@ pub fn run(
     let scenario = &job.sequence.scenario;
     let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
     let inputs = inputs::of_scenario(scenario);
-    check_folder(job, &inputs, console)?;
+    let adapter = source.adapter();
+    check_folder(job, &inputs, &adapter, console)?;
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // What cannot be planned is refused before anything is written.
@@ -90,7 +91,7 @@ pub fn run(
     let first_plan = begin.elapsed();
     let mut manifest = RunManifest {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        adapter: source.adapter(),
+        adapter,
         seed: scenario.seed,
         scenario: scenario.clone(),
         inputs,
@@ -157,11 +158,20 @@ fn is_empty(frame: &RenderedFrame) -> bool {
 }
 
 /// Frames of another scenario are never taken for this one's; without `--resume` they are only worth a warning.
-fn check_folder(job: &Job<'_>, inputs: &inputs::Inputs, console: &mut Console<'_>) -> Result<(), Failure> {
+fn check_folder(job: &Job<'_>, inputs: &inputs::Inputs, adapter: &str, console: &mut Console<'_>) -> Result<(), Failure> {
     match check_resume(job.folder, &job.sequence.scenario, inputs) {
         Err(error) if job.resume => Err(Failure::bad_input(error)),
         Err(ResumeError::Differs { path, made, .. }) => {
             console.warn(format_args!("{} was made {made}: files of the same name are replaced, others stay", path.display()));
+            Ok(())
+        }
+        Ok(true) if job.resume => {
+            if let Err(ResumeError::Differs { path, .. }) = check_resume_of(job.folder, "adapter", "by another adapter", &adapter) {
+                console.warn(format_args!(
+                    "{} was made by another adapter than {adapter}: frames that are there stay, and differ from what this one would make by what rounding does",
+                    path.display()
+                ));
+            }
             Ok(())
         }
         _ => Ok(()),

@@ -91,7 +91,15 @@ fn a_file_that_has_changed_is_told_by_resuming() {
     assert!(code == 2 && err.contains("when a file had something else in it") && err.contains(log.to_str().unwrap()), "{err}");
     assert_eq!((bytes(&folder, "frames.csv"), bytes(&folder, "run.json")), (before, kept), "nothing is touched");
     fs::write(&log, rows).unwrap();
-    assert_eq!(render(&["--frames", "2..5", "--resume"]).0, 0);
+    let (code, _, err) = render(&["--frames", "2..5", "--resume"]);
+    assert!(code == 0 && !err.contains("another adapter"), "{err}");
+
+    // Frames of another adapter stay, but that is said.
+    let manifest = fs::read_to_string(folder.join("run.json")).unwrap();
+    let adapter = run_json(&folder)["adapter"].as_str().unwrap().to_owned();
+    fs::write(folder.join("run.json"), manifest.replace(&adapter, "a card")).unwrap();
+    let (code, _, err) = render(&["--frames", "2..6", "--resume"]);
+    assert!(code == 0 && err.contains(&format!("run.json was made by another adapter than {adapter}")), "{err}");
 }
 
 #[test]
