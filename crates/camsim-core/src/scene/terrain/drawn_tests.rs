@@ -12,8 +12,6 @@ use super::{
 };
 use crate::pose::CameraPose;
 
-mod depth;
-
 const TANGENTS: [f64; 4] = [-0.7, 0.9, -0.6, 0.5];
 const FOCAL_PX: f64 = 400.0;
 
