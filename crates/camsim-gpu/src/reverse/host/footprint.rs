@@ -208,3 +208,35 @@ pub(super) fn scaled(lanes: &Lanes2, [x, y]: [f32; 2]) -> Lanes2 {
     let times = |lanes: &Lanes, by: f32| each(|i| lanes[i] * by);
     Lanes2 { x: times(&lanes.x, x), y: times(&lanes.y, y) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_of_every_grid_come_in_their_order_over_and_over() {
+        let cells = Cells::new();
+        // As many reads along a side as it has ideal pixels: lanes have the same grid, or each its own.
+        let side = |length: &dyn Fn(usize) -> u32| each(|i| length(i) as f32 + 0.05);
+        for grid in 0..MOST_TAPS * MOST_TAPS {
+            for own in [0, 1] {
+                let taps = |i: usize| {
+                    let grid = (grid + own * i as u32) % (MOST_TAPS * MOST_TAPS);
+                    [grid % MOST_TAPS + 1, grid / MOST_TAPS + 1]
+                };
+                let across = Lanes2 { x: side(&|i| taps(i)[0]), y: [0.0; LANES] };
+                let down = Lanes2 { x: [0.0; LANES], y: side(&|i| taps(i)[1]) };
+                let of = Grid::new(&cells, &[across, down], MOST_TAPS);
+                assert_eq!(of.is_common, own == 0);
+                let orders = [0, 1, 2, 3].map(|i| tap_shares(taps(i)));
+                for tap in 0..1000 {
+                    let found = of.shares_of(&[tap as f32; LANES]);
+                    for (i, order) in orders.iter().enumerate() {
+                        assert_eq!(of.count[i], order.len() as f32);
+                        assert_eq!([found.x[i], found.y[i]], order[tap % order.len()], "{:?} {tap}", taps(i));
+                    }
+                }
+            }
+        }
+    }
+}
