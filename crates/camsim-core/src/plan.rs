@@ -91,8 +91,9 @@ pub struct Planner {
     shutter: Shutter,
     zoom: Option<ZoomTable>,
     fixed: Option<Arc<LensReach>>,
-    /// The same with half of its probes, for even frames and odd ones of a group.
+    /// The same with half of its probes, for even frames and odd ones of a group; and with half of those, for every second of these frames.
     halves: Option<[Arc<LensReach>; 2]>,
+    quarters: Option<[[Arc<LensReach>; 2]; 2]>,
     outline: Arc<edges::SceneOutline>,
     grain: Arc<grain::SceneGrain>,
     surfaces: Arc<surfaces::Surfaces>,
@@ -149,6 +150,9 @@ impl Planner {
             None => Some(Arc::new(LensReach::new(Arc::new(CameraModel::from_spec(camera)?)).ok_or(PlanError::NoRay)?)),
         };
         let halves = fixed.as_ref().map(|reach| [false, true].map(|odd| Arc::new(reach.with_half_the_probes(odd))));
+        let quarters = halves
+            .as_ref()
+            .map(|halves| halves.each_ref().map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low)))));
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let max_ideal_px = MAX_IDEAL_PX;
         Ok(Self {
@@ -157,6 +161,7 @@ impl Planner {
             zoom,
             fixed,
             halves,
+            quarters,
             outline,
             grain,
             surfaces,
@@ -262,7 +267,7 @@ impl Planner {
         let shown = scenery.shown(blur.is_some());
         let tried = ideal;
         let mut case = error::Case {
-            reach: &look.reach,
+            reach: &look.tried,
             sequence: &self.sequence,
             shutter: &self.shutter,
             stamp_s,

@@ -75,6 +75,7 @@ fn the_largest_of_all_places_is_what_the_plan_says() {
     cases.push(("several ideal frames", several, city(5)));
     let mut still = camera();
     still.camera.shutter.exposure_ms = 0.0;
+    still.quality.frames_per_ideal = 1;
     cases.push(("no exposure", still, hills()));
     for (name, scenario, scene) in cases {
         let (plan, map) = mapped(&flown(scenario, scene), 3);
@@ -106,8 +107,11 @@ fn frames_of_one_ideal_frame_have_their_own_maps() {
     let sequence = sequence(scenario, steady(80.0, 0.0, DVec3::new(9.0, 2.0, -1.0), DVec3::new(0.1, -0.05, 0.2)), pattern(800.0));
     let shared: Vec<_> = (0..12).map(|frame| mapped(&sequence, frame)).filter(|(plan, _)| plan.shared_by.is_some()).collect();
     assert!(!shared.is_empty(), "no frame shares");
-    for (plan, map) in shared {
-        let (largest_px, total_px) = (map.largest_px(), plan.predicted.total_px);
+    for (plan, _) in &shared {
+        // Each is run dry at places of its own, and those that are solved in the same way answer for all of these.
+        let is_alike = |other: &FramePlan| other.shared_by == plan.shared_by && other.temporal == plan.temporal && other.blur == plan.blur;
+        let alike = shared.iter().filter(|(other, _)| is_alike(other));
+        let (largest_px, total_px) = (alike.map(|(_, map)| map.largest_px()).fold(0.0, f64::max), plan.predicted.total_px);
         assert!((largest_px - total_px).abs() < 1e-9 * total_px, "frame {}: {largest_px} px, the plan {total_px}", plan.frame);
     }
 }

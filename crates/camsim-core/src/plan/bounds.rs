@@ -68,13 +68,21 @@ impl LensReach {
 
     /// The same with every second of its probes: two neighbours in time, one `odd` and one not, have all of them.
     pub(super) fn with_half_the_probes(&self, odd: bool) -> Self {
+        self.with_every_second(|probe| probe.is_odd == odd)
+    }
+
+    /// Of those again every second: four neighbours in time have all.
+    pub(super) fn with_half_of_these(&self, low: bool) -> Self {
+        self.with_every_second(|probe| probe.is_low == low)
+    }
+
+    fn with_every_second(&self, is_one: impl Fn(&Probe) -> bool) -> Self {
         let Self { camera, rays, least_stretch, .. } = self;
-        let probes = self.probes.iter().filter(|probe| probe.is_odd == odd).copied().collect();
         Self {
             camera: camera.clone(),
             rays: rays.clone(),
             least_stretch: *least_stretch,
-            probes,
+            probes: self.probes.iter().filter(|probe| is_one(probe)).copied().collect(),
             probe_px: std::f64::consts::SQRT_2 * self.probe_px,
         }
     }

@@ -23,6 +23,8 @@ pub(super) struct Look<'a> {
     pub window_s: [f64; 2],
     pub zoom: Option<f64>,
     pub reach: Arc<LensReach>,
+    /// The same with the probes at which the pipeline is run dry.
+    pub tried: Arc<LensReach>,
     /// The ideal frame that others are made from too, if this one is to be.
     pub common: Option<&'a sharing::Common>,
     /// Whether half of the probes look: neighbours have the others.
@@ -71,6 +73,7 @@ impl Planner {
             (None, Some(table), Some(value)) => Arc::new(LensReach::new(Arc::new(table.at(value)?)).ok_or(PlanError::NoRay)?),
             _ => return Err(PlanError::NoRay),
         };
+        let tried = if has_half { self.quarter_of_the_probes(frame) } else { None }.unwrap_or_else(|| reach.clone());
         let (first, last) = self.shutter.window_s();
         let window_s = [stamp_s + first, stamp_s + last];
         let path = &*self.sequence.path;
@@ -80,7 +83,22 @@ impl Planner {
             Twist { velocity_m_s: key_pose.ned_from_camera.inverse() * path.velocity_ned(key_s), rate_rad_s: path.rate_camera(key_s) };
         let demanded = forced::temporal_stage(&self.sequence.scenario.quality);
         let asked = sharing::Asked::default();
-        Ok(Look { planner: self, frame, stamp_s, window_s, zoom, reach, common, has_half, asked, key_s, key_pose, key_twist, demanded })
+        Ok(Look {
+            planner: self,
+            frame,
+            stamp_s,
+            window_s,
+            zoom,
+            reach,
+            tried,
+            common,
+            has_half,
+            asked,
+            key_s,
+            key_pose,
+            key_twist,
+            demanded,
+        })
     }
 }
 

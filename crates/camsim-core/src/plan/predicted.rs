@@ -45,7 +45,7 @@ pub struct Predicted {
     pub holes: Option<Holes>,
     /// See above.
     pub holes_of_one: Option<Holes>,
-    /// Probes with a source.
+    /// Probes with a source, of all frames that share the ideal frame and are solved in the same way.
     pub probes: u32,
     /// Whether `total_px` is within `quality.max_error_px`, and no more than a hundredth of the probes are void.
     pub kept: bool,

@@ -20,8 +20,9 @@ pub(super) struct Probe {
     pub distorted: DVec2,
     /// d(uv)/d(output pixel), one column an axis.
     pub uv_from_px: DMat2,
-    /// Of two kinds of them, which lie like the fields of a chessboard, the second.
+    /// Of two kinds of them, which lie like the fields of a chessboard, the second; and whether its row is the second of two.
     pub is_odd: bool,
+    pub is_low: bool,
 }
 
 /// One probe a cell of a grid over the image, at a place of its own in each, and the image's corners; only pixels that have a ray.
@@ -33,11 +34,16 @@ pub(super) fn probes(camera: &CameraModel) -> Vec<Probe> {
             let k = f64::from(j * columns + i) + 0.5;
             let [x, y] = [(i, columns, width, SPREAD[0]), (j, rows, height, SPREAD[1])]
                 .map(|(cell, cells, side, spread)| ((f64::from(cell) + (k * spread).fract()) * f64::from(side) / f64::from(cells)) as u32);
-            ([x.min(width - 1), y.min(height - 1)], (i + j) % 2 == 1)
+            ([x.min(width - 1), y.min(height - 1)], [(i + j) % 2 == 1, j % 2 == 1])
         })
     });
-    let corners = [([0, 0], false), ([width - 1, 0], true), ([0, height - 1], true), ([width - 1, height - 1], false)];
-    inside.chain(corners).filter_map(|(pixel, is_odd)| probe(camera, pixel, is_odd)).collect()
+    let corners = [
+        ([0, 0], [false, false]),
+        ([width - 1, 0], [true, false]),
+        ([0, height - 1], [true, true]),
+        ([width - 1, height - 1], [false, true]),
+    ];
+    inside.chain(corners).filter_map(|(pixel, kind)| probe(camera, pixel, kind)).collect()
 }
 
 /// Columns and rows of probes: no more than there are pixels.
@@ -51,11 +57,11 @@ pub(super) fn spacing_px(camera: &CameraModel) -> f64 {
     (width * height).sqrt()
 }
 
-fn probe(camera: &CameraModel, pixel: [u32; 2], is_odd: bool) -> Option<Probe> {
+fn probe(camera: &CameraModel, pixel: [u32; 2], [is_odd, is_low]: [bool; 2]) -> Option<Probe> {
     let distorted = camera.distorted_from_pixel(DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])));
     let uv = camera.lens.undistort(distorted)?;
     let uv_from_px = camera.lens.jacobian(uv).inverse() * DMat2::from_diagonal(camera.focal_px.recip());
-    uv_from_px.is_finite().then_some(Probe { pixel, uv, distorted, uv_from_px, is_odd })
+    uv_from_px.is_finite().then_some(Probe { pixel, uv, distorted, uv_from_px, is_odd, is_low })
 }
 
 #[cfg(test)]
@@ -100,6 +106,28 @@ mod tests {
             for quarter in 0..4 {
                 let of_quarter = half.probes.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == quarter);
                 assert!((53..57).contains(&of_quarter.count()));
+            }
+        }
+    }
+
+    #[test]
+    fn four_frames_of_a_group_are_run_dry_at_all_probes_and_each_everywhere() {
+        let camera = CameraModel::new([640, 480], [307.6, 300.0], None, LensModel::Pinhole, &[]).unwrap();
+        let reach = LensReach::new(Arc::new(camera)).unwrap();
+        let quarters: Vec<LensReach> = [false, true]
+            .into_iter()
+            .flat_map(|odd| {
+                let half = reach.with_half_the_probes(odd);
+                [false, true].map(|low| half.with_half_of_these(low))
+            })
+            .collect();
+        let all: HashSet<[u32; 2]> = quarters.iter().flat_map(|quarter| quarter.probes.iter().map(|probe| probe.pixel)).collect();
+        assert_eq!(all.len(), reach.probes.len());
+        for quarter in &quarters {
+            assert!((quarter.probe_px / reach.probe_px - 2.0).abs() < 1e-9);
+            for corner in 0..4 {
+                let there = quarter.probes.iter().filter(|p| u32::from(p.pixel[0] > 319) + 2 * u32::from(p.pixel[1] > 239) == corner);
+                assert!((22..33).contains(&there.count()));
             }
         }
     }

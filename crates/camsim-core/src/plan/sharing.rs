@@ -14,7 +14,7 @@ use std::{
 use rayon::prelude::*;
 
 use super::{
-    FramePlan, KeyFrame, LensReach, Motion, Planner, Skip, bounds,
+    FramePlan, KeyFrame, LensReach, Motion, Planner, Predicted, Skip, bounds,
     bounds::View,
     levels::{FINEST_SCALE, NEARLY, Sampling, for_sampling_dn},
     look::{Look, Scenery},
@@ -152,6 +152,11 @@ impl Planner {
     /// What frames of a group look at: neighbours in time are nearly alike, and have other probes each.
     pub(super) fn half_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
         self.halves.as_ref().map(|[even, odd]| if frame.is_multiple_of(2) { even.clone() } else { odd.clone() })
+    }
+
+    /// What they are run dry at: their neighbours are made the same way, or nearly, from the same ideal frame.
+    pub(super) fn quarter_of_the_probes(&self, frame: u64) -> Option<Arc<LensReach>> {
+        self.quarters.as_ref().map(|quarters| quarters[(frame % 2) as usize][(frame / 2 % 2) as usize].clone())
     }
 
     /// The plan of a frame as its group has it; `None` where it is to be planned by itself.
@@ -302,13 +307,56 @@ fn together(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
     let (Some(first), Some(last)) = (plans.first().map(|plan| plan.frame), plans.last().map(|plan| plan.frame)) else { return plans };
     let terrain_error_px = plans.iter().map(|plan| plan.terrain_error_px).fold(f64::INFINITY, f64::min);
     let motion = plans.iter().map(|plan| plan.motion).reduce(Motion::and).unwrap_or_default();
-    for plan in &mut plans {
+    let sources: Vec<OfSources> = plans.iter().map(|plan| OfSources::of(plan, &plans)).collect();
+    for (plan, sources) in plans.iter_mut().zip(sources) {
+        sources.write(&mut plan.predicted);
         plan.shared_by = Some([first, last]);
         plan.terrain_error_px = terrain_error_px;
         plan.motion = motion;
         plan.skipped.push(Skip { what: "ideal frame of its own", reason: format!("frames {first} to {last} are made from one") });
     }
     plans
+}
+
+/// How far sources are off in frames from one ideal frame that are solved in the same way: each has been run dry at a part of the probes, and they are alike, so that all answer for the
+/// largest error that any has found.
+struct OfSources {
+    most: Predicted,
+    probes: u32,
+    kept: bool,
+}
+
+impl OfSources {
+    fn of(plan: &FramePlan, plans: &[FramePlan]) -> Self {
+        let is_alike = |other: &&FramePlan| other.temporal == plan.temporal && other.blur == plan.blur;
+        let all = || plans.iter().filter(is_alike).map(|plan| &plan.predicted);
+        let most = |of: fn(&Predicted) -> f64| all().map(of).fold(0.0, f64::max);
+        let worst = all().max_by(|a, b| a.total_px.total_cmp(&b.total_px));
+        Self {
+            most: Predicted {
+                lens_px: most(|of| of.lens_px),
+                temporal_px: most(|of| of.temporal_px),
+                depth_px: most(|of| of.depth_px),
+                level_of_detail_px: most(|of| of.level_of_detail_px),
+                nodes_px: most(|of| of.nodes_px),
+                format_px: most(|of| of.format_px),
+                total_px: most(|of| of.total_px),
+                void_share: most(|of| of.void_share),
+                in_the_way: worst.and_then(|worst| worst.in_the_way.clone()),
+                ..Predicted::default()
+            },
+            probes: all().map(|of| of.probes).sum(),
+            kept: all().all(|of| of.kept),
+        }
+    }
+
+    fn write(self, into: &mut Predicted) {
+        let Predicted { lens_px, temporal_px, depth_px, level_of_detail_px, nodes_px, format_px, total_px, void_share, in_the_way, .. } =
+            self.most;
+        (into.lens_px, into.temporal_px, into.depth_px, into.level_of_detail_px) = (lens_px, temporal_px, depth_px, level_of_detail_px);
+        (into.nodes_px, into.format_px, into.total_px, into.void_share) = (nodes_px, format_px, total_px, void_share);
+        (into.in_the_way, into.probes, into.kept) = (in_the_way, self.probes, self.kept);
+    }
 }
 
 impl Motion {

@@ -76,7 +76,7 @@ impl Planner {
     /// As [`Planner::plan`].
     pub fn error_map(&self, plan: &FramePlan) -> Result<ErrorMap, PlanError> {
         let own = self.look(plan.frame, None)?.reach;
-        let reach = if plan.shared_by.is_some() { self.half_the_probes(plan.frame).unwrap_or(own) } else { own };
+        let reach = if plan.shared_by.is_some() { self.quarter_of_the_probes(plan.frame).unwrap_or(own) } else { own };
         let ideal = self.tried(plan)?;
         // Of several ideal frames the prediction has the one in the middle of the window.
         let (key_s, key_pose) = match plan.keys.as_slice() {
