@@ -115,9 +115,10 @@ fn pixels_without_a_ray_have_no_answer_and_rays_beyond_the_fold_are_counted() {
     fs::write(&points, "x_px,y_px\n0,0\n319.5,239.5\n").unwrap();
     let (code, out, _) = camsim(["lens", text(&camera), "undistort", "--points", text(&points)]);
     assert_eq!((code, out.as_str()), (0, "u,v,valid\nNaN,NaN,0\n0.0,0.0,1\n"));
-    fs::write(&points, "u,v\n1.5,0\n0.1,0\n").unwrap();
+    fs::write(&points, "u,v\n1.5,0\nNaN,0\n0.1,0\n").unwrap();
     let (code, out, err) = camsim(["lens", text(&camera), "distort", "--points", text(&points)]);
-    assert!(code == 0 && out.starts_with("x_px,y_px\n") && err.contains("1 of 2 points"), "{out}{err}");
+    assert!(code == 0 && out.starts_with("x_px,y_px\n") && out.contains("\nNaN,NaN\n"), "{out}");
+    assert!(err.contains("1 of 3 points lie beyond") && err.contains("1 of 3 points are not finite"), "{err}");
     assert_eq!(camsim(["-q", "lens", text(&camera), "distort", "--points", text(&points)]).2, "");
 
     let (code, out, _) = camsim(["lens", text(&camera), "check", "--json"]);

@@ -156,6 +156,9 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     if parts.is_empty() {
         notes.push("has no triangles: nothing of it is shown".into());
     }
+    if options.time_s.is_some() && document.animations().next().is_none() {
+        notes.push("has no animation for time_s to be a time of: its nodes are as they stand".into());
+    }
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();

@@ -81,11 +81,15 @@ fn read_camera(path: &Path) -> Result<CameraModel, Failure> {
 
 fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
     let points = read_points(args.points.as_deref(), ["u", "v"]).or_bad_input()?;
-    let beyond = points.iter().filter(|ideal| !camera.lens.contains(**ideal)).count();
+    let unknown = points.iter().filter(|ideal| !ideal.is_finite()).count();
+    let beyond = points.iter().filter(|ideal| ideal.is_finite() && !camera.lens.contains(**ideal)).count();
     write_output(args.output.as_deref(), console, |out| {
         writeln!(out, "x_px,y_px")?;
         for pixel in points.iter().map(|ideal| camera.project(*ideal)) {
-            writeln!(out, "{:?},{:?}", pixel.x, pixel.y)?;
+            match pixel.is_finite() {
+                true => writeln!(out, "{:?},{:?}", pixel.x, pixel.y)?,
+                false => writeln!(out, "NaN,NaN")?,
+            }
         }
         Ok(())
     })?;
@@ -95,7 +99,17 @@ fn distort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -
             points.len()
         ));
     }
+    if unknown > 0 {
+        console.warn(format_args!("{unknown} of {} points are not finite numbers: they have no pixels", points.len()));
+    }
+    warn_of_none(&points, console);
     Ok(())
+}
+
+fn warn_of_none(points: &[DVec2], console: &mut Console<'_>) {
+    if points.is_empty() {
+        console.warn("there are no points: the answer is a header alone");
+    }
 }
 
 fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -109,7 +123,9 @@ fn undistort(camera: &CameraModel, args: &PointsArgs, console: &mut Console<'_>)
             }
         }
         Ok(())
-    })
+    })?;
+    warn_of_none(&points, console);
+    Ok(())
 }
 
 fn check(camera: &CameraModel, json: bool, console: &mut Console<'_>) -> Result<(), Failure> {

@@ -66,6 +66,15 @@ fn strips_and_fans_turn_one_way() {
 }
 
 #[test]
+fn a_time_without_an_animation_is_noted() {
+    let noted =
+        |time_s: Option<f64>| square_with(5, "", r#"{ "mesh": 0 }"#, GltfOptions { time_s, ..GltfOptions::default() }).unwrap().notes;
+    assert!(noted(None).is_empty());
+    let notes = noted(Some(1.0));
+    assert!(notes.len() == 1 && notes[0].starts_with("has no animation for time_s"), "{notes:?}");
+}
+
+#[test]
 fn what_is_mirrored_keeps_its_outside() {
     let mirrored = square(5, "", r#"{ "mesh": 0, "scale": [1, 1, -2] }"#).unwrap();
     for [a, b, c] in corners(&mirrored) {

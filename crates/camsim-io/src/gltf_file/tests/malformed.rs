@@ -52,7 +52,8 @@ impl Good {
         std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
         let path = folder.path().join("model.gltf");
         std::fs::write(&path, self.json.to_string()).unwrap();
-        read_gltf(&path, GltfOptions { time_s: Some(0.5), ..GltfOptions::default() }).map_err(|error| error.to_string())
+        let options = GltfOptions { time_s: self.json.get("animations").map(|_| 0.5), ..GltfOptions::default() };
+        read_gltf(&path, options).map_err(|error| error.to_string())
     }
 }
 
