@@ -20,6 +20,7 @@ use std::{
         Arc,
         mpsc::{Receiver, Sender, channel},
     },
+    thread::JoinHandle,
 };
 
 pub use errors::{DECADES, Errors};
@@ -29,7 +30,8 @@ pub use messages::{ExactPicture, ExactWanted, FrameReply, Reply, Size, Stage, Tr
 pub use picture::{Difference, Picture, ramp};
 pub use variants::{preview_factor, staged};
 
-/// The engine's threads as the window sees them. Dropping it ends them after what they are at.
+/// The engine's threads as the window sees them. Dropping it ends them and waits until they have: whoever ends the program while one of them still gives its device back
+/// may do so in a driver that is just being unloaded, which is a fault of memory now and then.
 #[derive(Debug)]
 pub struct Handle {
     previews: Arc<Mailbox<Wanted>>,
@@ -37,6 +39,7 @@ pub struct Handle {
     exact: Arc<Mailbox<ExactWanted>>,
     library: Arc<Library>,
     replies: Receiver<Reply>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 /// Where replies go; each asks for a repaint.
@@ -67,13 +70,14 @@ impl Handle {
         let speaker = Speaker { replies: sender, repaint: Arc::new(repaint) };
         let (previews, frames, exact) = (Arc::new(Mailbox::default()), Arc::new(Mailbox::default()), Arc::new(Mailbox::default()));
         let library = Arc::new(Library::default());
+        let mut threads = Vec::new();
         for (name, mailbox) in [("camsim previews", &previews), ("camsim frames", &frames)] {
             let (mailbox, library, voice) = (mailbox.clone(), library.clone(), speaker.clone());
-            spawn(name, speaker.clone(), move || worker::run(&mailbox, &library, &voice));
+            threads.extend(spawn(name, speaker.clone(), move || worker::run(&mailbox, &library, &voice)));
         }
         let (mailbox, voice) = (exact.clone(), speaker.clone());
-        spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice));
-        Self { previews, frames, exact, library, replies }
+        threads.extend(spawn("camsim oracle", speaker, move || exact::run(&mailbox, &voice)));
+        Self { previews, frames, exact, library, replies, threads }
     }
 
     /// Replaces what is wanted of the renderer.
@@ -104,18 +108,38 @@ impl Drop for Handle {
         self.previews.close();
         self.frames.close();
         self.exact.close();
+        for thread in self.threads.drain(..) {
+            // Its panics are caught and told where they happen.
+            let _ = thread.join();
+        }
     }
 }
 
 /// A thread that comes back after a panic, with a word about it: a fault in one frame must not leave the window with nothing behind it.
-fn spawn(name: &str, speaker: Speaker, body: impl Fn() + Send + 'static) {
+fn spawn(name: &str, speaker: Speaker, body: impl Fn() + Send + 'static) -> Option<JoinHandle<()>> {
     let voice = speaker.clone();
     let body = move || {
         while catch_unwind(AssertUnwindSafe(&body)).is_err() {
             voice.say(Reply::Failed("the renderer stopped at a fault of its own; it goes on with the next change".into()));
         }
     };
-    if let Err(error) = std::thread::Builder::new().name(name.into()).spawn(body) {
+    let no_thread = |error: &std::io::Error| {
         speaker.say(Reply::Failed(format!("no thread for the renderer: {error}; close other programs and open the viewer again")));
+    };
+    std::thread::Builder::new().name(name.into()).spawn(body).inspect_err(no_thread).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_thread_outlives_the_handle() {
+        let held = Arc::new(());
+        for _ in 0..20 {
+            let by_threads = held.clone();
+            drop(Handle::start(move || drop(by_threads.clone())));
+            assert_eq!(Arc::strong_count(&held), 1, "threads still speak");
+        }
     }
 }

@@ -35,7 +35,8 @@ fn the_inspector_tells_what_the_pixel_sees() {
     let reply = &window.state().heard.shown.as_ref().expect("shown").reply;
     let (map, plan) = (&reply.errors.first().expect("asked for").map, &reply.pictures[0].plan);
     let around_px = map.around_px(pixel).expect("ground");
-    assert!(around_px > 0.0 && around_px <= map.largest_px() && (map.largest_px() - plan.predicted.total_px).abs() < 1e-9);
+    // The plan answers for the frames that are made like this one too.
+    assert!(around_px > 0.0 && around_px <= map.largest_px() && map.largest_px() <= plan.predicted.total_px + 1e-9);
     assert!(has(&window, &format!("{around_px:.5} px")), "what is predicted here");
     window.harness.key_press(Key::Escape);
     window.step();

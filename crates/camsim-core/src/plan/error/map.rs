@@ -70,7 +70,8 @@ impl ErrorMap {
 impl Planner {
     /// The predicted error of a frame from place to place, by the dry runs that its plan was chosen by. It takes about as long as these: a fraction of a plan.
     ///
-    /// Frames that share an ideal frame may have a finer terrain than each alone would: their places tell of what is drawn, and may then be below what the plan says.
+    /// Frames that share an ideal frame have places of their own, and may have a finer terrain than each alone would: these tell of what is drawn there, and may be below what the plan says, which
+    /// answers for all that are solved in the same way.
     ///
     /// # Errors
     /// As [`Planner::plan`].
