@@ -1,6 +1,6 @@
 //! The engine's side of the viewer: threads that load and render, and the messages by which the window speaks with them.
 //!
-//! The window never waits. What it wants stands in a [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a
+//! The window never waits, but when it closes: then for the frame that is at work. What it wants stands in a [`Mailbox`] that holds one request, the latest; what comes back are [`Reply`]s in a
 //! channel, and a repaint is asked for with each. Previews and full frames have a thread and a device each, and egui has its own: a device has
 //! one queue, in order, and a hand that moves on must not wait for a full frame, nor the window for either. Finished pictures cross by way of
 //! the host, as `camsim render` reads them. What is loaded is shared.
