@@ -34,7 +34,7 @@ pub struct Args {
 
 #[derive(Debug, clap::Subcommand)]
 enum Command {
-    /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px
+    /// Ideal (u, v) = (x/z, y/z) to pixels: reads u,v and writes x_px,y_px (NaN where u or v is not finite)
     Distort(PointsArgs),
     /// Pixels to ideal (u, v): reads x_px,y_px and writes u,v,valid (NaN and 0 where the lens has no answer)
     Undistort(PointsArgs),

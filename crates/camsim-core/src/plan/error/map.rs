@@ -33,7 +33,7 @@ pub struct ErrorPlace {
 /// The predicted error of a frame from place to place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorMap {
-    /// One a probe: some 430, or half of them for a frame of a group, evenly over the pixels that have a ray.
+    /// One a probe: some 430, or a quarter of them for a frame that shares its ideal frame, evenly over the pixels that have a ray.
     pub places: Vec<ErrorPlace>,
     /// What is known of the frame as a whole only, and comes on top everywhere while the exposure lasts: curves between its nodes, and depth between its ends.
     /// Nothing at mid-exposure.
