@@ -3,4 +3,5 @@
 #![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one place in all arrays")]
 
 pub(crate) mod lanes;
+pub(crate) mod large;
 pub(crate) mod vectors;

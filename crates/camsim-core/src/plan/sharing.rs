@@ -18,6 +18,7 @@ use super::{
     bounds::View,
     levels::{FINEST_SCALE, NEARLY, Sampling, for_sampling_dn},
     look::{Look, Scenery},
+    picture::Picture,
 };
 use crate::scenario::{Auto, Preset, Silhouettes};
 
@@ -79,9 +80,9 @@ impl<'a> Candidates<'a> {
     }
 
     /// How a frame would be sampled by itself, for a part of `quality.max_error_dn`.
-    fn sampling(&self, frame: u64, share_of_dn: f64) -> Option<Sampling> {
+    fn picture(&self, frame: u64, share_of_dn: f64) -> Option<Picture> {
         let (look, scenery) = self.see(frame, None)?;
-        Some(look.asking(Asked { share_of_dn, given: None }).picture(scenery).sampling)
+        Some(look.asking(Asked { share_of_dn, given: None }).picture(scenery))
     }
 
     /// The plan of a frame that is sampled so.
@@ -245,7 +246,9 @@ impl Planner {
         // All are sampled as the first needs it; if that is too coarse for another, as that one does.
         let mut coarsest = frames.start;
         for share_of_dn in SHARES {
-            let sampling = candidates.sampling(coarsest, share_of_dn)?;
+            // What is dearer than frames by themselves already is no cheaper with its solver.
+            let picture = candidates.picture(coarsest, share_of_dn).filter(|picture| is_worth_it(picture.price.ms, 1))?;
+            let sampling = picture.sampling;
             candidates.see(frames.end - 1, Some(sampling))?;
             // Pictures take less than plans, and more often tell that it does not do.
             let by_pictures = candidates.too_coarse(sampling, own).ok()?;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::{
     context::{GpuContext, GpuError},
+    host::large::Large,
     layout::Truth,
 };
 
@@ -143,12 +144,12 @@ impl Rows {
     }
 
     /// The texels without what lies between rows, once it is mapped.
-    pub fn read<T: bytemuck::Pod>(&self) -> Result<Vec<T>, GpuError> {
-        let [width, height] = self.size_px;
-        let mut values = Vec::with_capacity(width as usize * height as usize);
-        let row_bytes = width as usize * size_of::<T>();
-        for row in self.view()?.chunks_exact(self.stride_bytes as usize).take(height as usize) {
-            values.extend(bytemuck::pod_collect_to_vec::<u8, T>(&row[..row_bytes]));
+    pub fn read<T: bytemuck::Pod>(&self) -> Result<Large<T>, GpuError> {
+        let [width, height] = self.size_px.map(|side| side as usize);
+        let mut values = Large::zeros(width * height);
+        for (into, row) in values.chunks_exact_mut(width).zip(self.view()?.chunks_exact(self.stride_bytes as usize)) {
+            let into: &mut [u8] = bytemuck::cast_slice_mut(into);
+            into.copy_from_slice(&row[..into.len()]);
         }
         Ok(values)
     }

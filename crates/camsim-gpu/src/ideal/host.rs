@@ -19,6 +19,7 @@ use super::{base_ned_m, ideal_camera, surfaces::see_meshes};
 use crate::{
     host::{
         lanes::LANES,
+        large::Large,
         vectors::{Vectors, widest},
     },
     upload::{MeshBatch, SceneBuffers},
@@ -54,9 +55,9 @@ const CHANNELS: usize = 4;
 #[derive(Debug, Default)]
 pub(crate) struct DrawnFrame {
     /// Linear R G B A, half floats.
-    pub color: Vec<u16>,
+    pub color: Large<u16>,
     /// near / z; 0 is infinitely far.
-    pub depth: Vec<f32>,
+    pub depth: Large<f32>,
     /// Texels from one row to the next, of both.
     pub stride: usize,
 }
@@ -81,7 +82,7 @@ pub(crate) struct HostScene {
     chunks: Vec<Chunk>,
     terrain: Vec<Corner<2>>,
     /// Which triangle each pixel shows.
-    shown: Vec<u32>,
+    shown: Large<u32>,
 }
 
 /// Meshes of one shape and material.
@@ -141,7 +142,7 @@ impl HostScene {
             light: batch.light,
         };
         let models = buffers.batches.iter().map(model).collect();
-        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Vec::new() })
+        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Large::default() })
     }
 
     /// Draws the one ideal frame of a plan.
@@ -156,9 +157,9 @@ impl HostScene {
         };
         let [width, height] = camera.size_px.map(|side| side as usize);
         into.stride = (width + BEYOND).next_multiple_of(LANES);
-        into.depth.resize(into.stride * height, 0.0);
-        into.color.resize(CHANNELS * into.stride * height, 0);
-        self.shown.resize(into.stride * height, SKY);
+        into.depth.fit(into.stride * height);
+        into.color.fit(CHANNELS * into.stride * height);
+        self.shown.fit(into.stride * height);
         let (seen, drawn) = see_meshes(view.buffers, &key.pose, view.tolerance);
         let mut parts = terrain_parts(view.terrain);
         self.add_parts(&drawn, &mut parts);

@@ -4,6 +4,7 @@ use camsim_core::scene::{TexelForm, Texture, Wrap};
 
 use crate::host::{
     lanes::{LANES, Lanes, each, lower, whole, within},
+    large::Large,
     vectors::Vectors,
 };
 
@@ -24,7 +25,7 @@ pub(super) enum Picture {
 /// A picture and its smaller versions, the largest first: texels row after row, and after the last column and the last row what follows them.
 #[derive(Debug)]
 pub(super) struct Texels {
-    halves: Vec<u16>,
+    halves: Large<u16>,
     /// Of each version, where it begins and half floats from one row to the next.
     begins: [u32; MOST_VERSIONS],
     strides: [u32; MOST_VERSIONS],
@@ -56,7 +57,7 @@ impl Picture {
 impl Texels {
     fn new(texture: &Texture, repeats: [bool; 2]) -> Self {
         let mut texels = Self {
-            halves: Vec::new(),
+            halves: Large::default(),
             begins: [0; MOST_VERSIONS],
             strides: [0; MOST_VERSIONS],
             widths: [1.0; MOST_VERSIONS],
@@ -65,29 +66,34 @@ impl Texels {
             repeats,
         };
         let mips = texture.mips(TexelForm::Light);
-        texels.add(0, &texture.texels(&texture.rgba8, TexelForm::Light), texture.size_px);
+        let sizes = [texture.size_px].into_iter().chain(mips.iter().map(|mip| mip.size_px));
+        texels.halves.fit(sizes.map(halves_of).sum());
+        let mut end = texels.add(0, 0, &texture.texels(&texture.rgba8, TexelForm::Light), texture.size_px);
         for (mip, number) in mips.iter().zip(1..MOST_VERSIONS) {
-            texels.add(number, &mip.texels, mip.size_px);
+            end = texels.add(number, end, &mip.texels, mip.size_px);
         }
         texels
     }
 
-    fn add(&mut self, number: usize, bytes: &[u8], size_px: [u32; 2]) {
+    /// Adds a version from `begin` on; where it ends.
+    fn add(&mut self, number: usize, begin: usize, bytes: &[u8], size_px: [u32; 2]) -> usize {
         let [width, height] = size_px.map(|side| side as usize);
-        let row_halves = CHANNELS * width;
-        self.halves.reserve((row_halves + CHANNELS) * (height + 1));
-        self.begins[number] = self.halves.len() as u32;
-        self.strides[number] = (row_halves + CHANNELS) as u32;
+        let (row_halves, stride) = (CHANNELS * width, CHANNELS * (width + 1));
+        (self.begins[number], self.strides[number]) = (begin as u32, stride as u32);
         (self.widths[number], self.heights[number]) = (width as f32, height as f32);
         self.last = number as f32;
-        let last = if self.repeats[1] { 0 } else { height - 1 };
-        for row in (0..height).chain([last]) {
-            let first = self.halves.len();
+        let [repeats, repeats_rows] = self.repeats;
+        let end = begin + halves_of(size_px);
+        let rows = (0..height).chain([if repeats_rows { 0 } else { height - 1 }]);
+        for (row, into) in rows.zip(self.halves[begin..end].chunks_exact_mut(stride)) {
             let row = &bytes[2 * row_halves * row..2 * row_halves * (row + 1)];
-            self.halves.extend(row.chunks_exact(2).map(|half| u16::from_ne_bytes([half[0], half[1]])));
-            let next = if self.repeats[0] { first } else { first + row_halves - CHANNELS };
-            self.halves.extend_from_within(next..next + CHANNELS);
+            for (half, into) in row.chunks_exact(2).zip(&mut *into) {
+                *into = u16::from_ne_bytes([half[0], half[1]]);
+            }
+            let next = if repeats { 0 } else { row_halves - CHANNELS };
+            into.copy_within(next..next + CHANNELS, row_halves);
         }
+        end
     }
 
     /// Of the picture itself.
@@ -143,6 +149,7 @@ impl Texels {
                 (begin[i], stride[i]) = (self.begins[number], self.strides[number]);
             }
         }
+        let halves = &*self.halves;
         let (x, across) = along(u, &width, self.repeats[0]);
         let (y, down) = along(v, &height, self.repeats[1]);
         let mut first = [0; LANES];
@@ -154,7 +161,7 @@ impl Texels {
                 continue;
             }
             let (first, span) = (first[i] as usize, stride[i] as usize + 2 * CHANNELS);
-            let of = self.halves.get(first..first + span).and_then(|halves| Some((*halves.first_chunk()?, *halves.last_chunk()?)));
+            let of = halves.get(first..first + span).and_then(|halves| Some((*halves.first_chunk()?, *halves.last_chunk()?)));
             let Some((top, bottom)) = of else { continue };
             let (top, bottom) = (vectors.numbers(top), vectors.numbers(bottom));
             for k in 0..2 * CHANNELS {
@@ -165,6 +172,11 @@ impl Texels {
             }
         }
     }
+}
+
+/// Half floats of a version: a row and a column more than it has.
+fn halves_of([width, height]: [u32; 2]) -> usize {
+    CHANNELS * (width as usize + 1) * (height as usize + 1)
 }
 
 /// Whole texel that a place along a side lies after, and how far after it.

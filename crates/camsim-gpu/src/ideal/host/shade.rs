@@ -140,25 +140,28 @@ impl Shader<'_> {
         }
         if !is_empty {
             let seen = self.seen([x, y], depth, shown, planes);
-            let mut left = seen.paint.map(|paint| paint != SKY);
-            while let Some(first) = left.iter().position(|&is_left| is_left) {
-                let paint = seen.paint[first];
+            let mut left = seen.paint;
+            while let Some(&paint) = left.iter().find(|&&paint| paint != SKY) {
                 let mut is_asked = [false; LANES];
                 for i in 0..LANES {
                     is_asked[i] = seen.paint[i] == paint;
-                    left[i] &= !is_asked[i];
+                    left[i] = if is_asked[i] { SKY } else { left[i] };
                 }
                 self.paint(vectors, &self.paints[paint as usize], [x, y], &seen, shown, &is_asked, &mut colors);
             }
             self.fog([x, y], &seen, &mut colors);
         }
-        for ((pixels, shown), out) in colors.chunks_exact(2).zip(shown.chunks_exact(2)).zip(out.chunks_exact_mut(8)) {
-            let [[r0, g0, b0, a0], [r1, g1, b1, a1]] = [pixels[0], pixels[1]];
-            let halves = vectors.halves([r0, g0, b0, a0, r1, g1, b1, a1]);
-            let from = if self.is_over && shown[0] == SKY { 4 } else { 0 };
-            let to = if self.is_over && shown[1] == SKY { 4 } else { 8 };
-            if from < to {
-                out[from..to].copy_from_slice(&halves[from..to]);
+        let pairs = out.as_chunks_mut::<8>().0.iter_mut().zip(colors.as_flattened().as_chunks::<8>().0);
+        for (pair, (out, pixels)) in pairs.enumerate() {
+            let halves = vectors.halves(*pixels);
+            if !self.is_over {
+                *out = halves;
+                continue;
+            }
+            for k in 0..8 {
+                if shown[2 * pair + k / 4] != SKY {
+                    out[k] = halves[k];
+                }
             }
         }
     }
@@ -166,12 +169,15 @@ impl Shader<'_> {
     #[inline(always)]
     fn seen(&self, [x, y]: [usize; 2], depth: &[f32; LANES], shown: &[u32; LANES], planes: &mut Planes) -> Seen {
         // Neighbours mostly show the same triangle. What is written beyond its end the next one writes over.
+        const { assert!(LANES == u32::BITS as usize) };
+        let mut begins = 0_u32;
+        for i in 1..LANES {
+            begins |= u32::from(shown[i] != shown[i - 1]) << i;
+        }
         let mut begin = 0;
         while begin < LANES {
-            let mut end = begin + 1;
-            while end < LANES && shown[end] == shown[begin] {
-                end += 1;
-            }
+            let end = begins.trailing_zeros() as usize;
+            begins &= begins.wrapping_sub(1);
             let surface = self.surface(shown[begin]);
             planes.write(surface, [x, y], begin..end);
             if surface.large != SMALL {

@@ -144,7 +144,7 @@ struct Axis {
 }
 
 /// Axis by axis, which of the three.
-const SPLINE_READS: [[usize; 2]; 5] = [[1, 1], [1, 0], [1, 2], [0, 1], [2, 1]];
+pub(super) const SPLINE_READS: [[usize; 2]; 5] = [[1, 1], [1, 0], [1, 2], [0, 1], [2, 1]];
 
 impl Spline {
     /// Around places. Softness 0 is Catmull-Rom's, 1 the B-spline.
@@ -162,14 +162,12 @@ impl Spline {
         Self(axes)
     }
 
-    /// Places of its reads and their weights.
+    /// Place of one of its [reads](SPLINE_READS) and its weight.
     #[inline(always)]
-    pub fn reads(&self) -> impl Iterator<Item = (Lanes2, Lanes)> {
+    pub fn read(&self, [x, y]: [usize; 2]) -> (Lanes2, Lanes) {
         let [across, down] = &self.0;
-        SPLINE_READS.into_iter().map(|[x, y]| {
-            let at_px = Lanes2 { x: across.at_px[x], y: down.at_px[y] };
-            (at_px, each(|i| across.weight[x][i] * down.weight[y][i]))
-        })
+        let at_px = Lanes2 { x: across.at_px[x], y: down.at_px[y] };
+        (at_px, each(|i| across.weight[x][i] * down.weight[y][i]))
     }
 }
 

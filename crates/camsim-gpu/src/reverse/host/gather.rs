@@ -4,7 +4,7 @@ use camsim_core::plan::PathStage;
 
 use super::{
     Reads,
-    footprint::{Footprint, Spline},
+    footprint::{Footprint, SPLINE_READS, Spline},
     ideal::Halves,
     source::{Nodes, Pose, Source},
 };
@@ -203,7 +203,9 @@ impl Reads<'_> {
         if (0..LANES).any(is_wide) {
             self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), |i| is_taken(i) && is_wide(i), |_| 1.0, sum);
         }
-        for (at_px, weight) in Spline::around(at_px, softness).reads() {
+        let spline = Spline::around(at_px, softness);
+        for read in SPLINE_READS {
+            let (at_px, weight) = spline.read(read);
             self.ideal.add_color(vectors, self.frame, &at_px, |i| is_taken(i) && !is_wide(i), |i| weight[i], sum);
         }
     }

@@ -1,0 +1,135 @@
+//! Numbers that frame after frame reads all over, in large pages where the system has them: a processor remembers where a few pages are, and looks
+//! the others up over and over.
+
+use std::ops::{Deref, DerefMut};
+
+use bytemuck::Pod;
+
+/// Numbers in a row. What holds at least a large page asks for such; everything else, and where there are none, is a vector.
+#[derive(Debug)]
+pub(crate) enum Large<T> {
+    Heap(Vec<T>),
+    #[cfg(target_os = "linux")]
+    Pages(pages::Pages, usize),
+}
+
+impl<T> Default for Large<T> {
+    fn default() -> Self {
+        Self::Heap(Vec::new())
+    }
+}
+
+impl<T: Pod> Large<T> {
+    /// So many zeros.
+    pub fn zeros(len: usize) -> Self {
+        #[cfg(target_os = "linux")]
+        if let Some(pages) = pages::Pages::of(len.saturating_mul(size_of::<T>())) {
+            return Self::Pages(pages, len);
+        }
+        Self::Heap(vec![T::zeroed(); len])
+    }
+
+    /// Has so many from now on: what it had, or zeros. It grows and does not shrink.
+    pub fn fit(&mut self, len: usize) {
+        match self {
+            Self::Heap(values) if len <= values.capacity() => values.resize(len, T::zeroed()),
+            #[cfg(target_os = "linux")]
+            Self::Pages(pages, of) if len <= pages.bytes().len() / size_of::<T>() => *of = len,
+            _ => *self = Self::zeros(len),
+        }
+    }
+}
+
+impl<T: Pod> Deref for Large<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        match self {
+            Self::Heap(values) => values,
+            #[cfg(target_os = "linux")]
+            Self::Pages(pages, len) => bytemuck::cast_slice(&pages.bytes()[..len * size_of::<T>()]),
+        }
+    }
+}
+
+impl<T: Pod> DerefMut for Large<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match self {
+            Self::Heap(values) => values,
+            #[cfg(target_os = "linux")]
+            Self::Pages(pages, len) => bytemuck::cast_slice_mut(&mut pages.bytes_mut()[..*len * size_of::<T>()]),
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+mod pages {
+    use memmap2::{Advice, MmapMut};
+
+    /// Of x86-64, and of aarch64 with pages of 4 KiB.
+    const LARGE_PAGE_BYTES: usize = 2 << 20;
+
+    /// Memory of the system's own, whole large pages from the first byte on.
+    #[derive(Debug)]
+    pub struct Pages {
+        memory: MmapMut,
+        first: usize,
+    }
+
+    impl Pages {
+        /// Of zeros; `None` for what is smaller than a page, and where the system gives none.
+        pub fn of(bytes: usize) -> Option<Self> {
+            let bytes = Some(bytes).filter(|&bytes| bytes >= LARGE_PAGE_BYTES)?.checked_next_multiple_of(LARGE_PAGE_BYTES)?;
+            // Most systems begin what is so large at a large page; one more is room for those that do not, and is never touched.
+            let memory = MmapMut::map_anon(bytes.checked_add(LARGE_PAGE_BYTES)?).ok()?;
+            memory.advise(Advice::HugePage).ok()?;
+            let first = memory.as_ptr().align_offset(LARGE_PAGE_BYTES);
+            (first <= LARGE_PAGE_BYTES).then_some(Self { memory, first })
+        }
+
+        fn len(&self) -> usize {
+            self.memory.len() - LARGE_PAGE_BYTES
+        }
+
+        pub fn bytes(&self) -> &[u8] {
+            &self.memory[self.first..self.first + self.len()]
+        }
+
+        pub fn bytes_mut(&mut self) -> &mut [u8] {
+            let end = self.first + self.len();
+            &mut self.memory[self.first..end]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stay_what_they_are_however_many_there_are() {
+        // Below a large page, one, and several; and back.
+        let mut all: Large<u32> = Large::default();
+        assert!(all.is_empty());
+        for len in [3, 1 << 19, 1 << 19, 5_000_001, 7, 1 << 19, 5_000_001] {
+            all.fit(len);
+            assert_eq!(all.len(), len);
+            for (value, i) in all.iter_mut().zip(0..) {
+                *value = i;
+            }
+            assert!(all.iter().zip(0..).all(|(&value, i): (&u32, u32)| value == i), "{len}");
+        }
+        let zeros: Large<[f32; 2]> = Large::zeros(700_001);
+        assert!(zeros.len() == 700_001 && zeros.iter().all(|&of| of == [0.0; 2]));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_holds_a_large_page_begins_at_one() {
+        for (len, is_large) in [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)] {
+            let numbers: Large<f64> = Large::zeros(len);
+            assert_eq!(matches!(numbers, Large::Pages(..)), is_large, "{len}");
+            assert!(!is_large || numbers.as_ptr().align_offset(2 << 20) == 0, "{len}");
+        }
+    }
+}
