@@ -2,7 +2,7 @@
 
 use camsim_core::temporal::tap_shares;
 
-use crate::host::lanes::{LANES, Lanes, Lanes2, each, higher, lower, whole, within};
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole, within};
 use crate::reverse::TapKind;
 
 /// Reads along a side at most: of each grid up to that the order of reads is written down.
@@ -134,69 +134,70 @@ fn softness(sides: &[Lanes2; 2]) -> Lanes2 {
     Lanes2 { x: along(&sides[0]), y: along(&sides[1]) }
 }
 
-/// A cubic spline as five bilinear reads: the one between, those above and below it, those left and right of it.
-pub(super) struct Spline([Axis; 2]);
-
-/// Of one axis: places of the reads before, between and after, and their weights.
-struct Axis {
-    at_px: [Lanes; 3],
-    weight: [Lanes; 3],
+/// A cubic spline over the texels around places: four by four without the corners.
+pub(super) struct Spline {
+    /// Column and row of the second texel each.
+    pub base: Lanes2,
+    /// Weights of columns, and of rows; without the corners the products are 1 together.
+    pub columns: [Lanes; 4],
+    pub rows: [Lanes; 4],
 }
 
-/// Axis by axis, which of the three.
+/// A spline as five bilinear reads, axis by axis: the one between, those above and below it, those left and right of it.
 pub(super) const SPLINE_READS: [[usize; 2]; 5] = [[1, 1], [1, 0], [1, 2], [0, 1], [2, 1]];
 
 impl Spline {
     /// Around places. Softness 0 is Catmull-Rom's, 1 the B-spline.
     #[inline(always)]
     pub fn around(at_px: &Lanes2, softness: &Lanes2) -> Self {
-        let mut axes = [Axis::around(&at_px.x, &softness.x), Axis::around(&at_px.y, &softness.y)];
-        // All five together: nothing is lost with the corners.
+        let base = Lanes2 { x: each(|i| at_px.x[i].floor()), y: each(|i| at_px.y[i].floor()) };
+        let columns = weights(&at_px.x, &base.x, &softness.x);
+        let mut rows = weights(&at_px.y, &base.y, &softness.y);
+        let ([x0, x1, x2, x3], [y0, y1, y2, y3]) = (&columns, &rows);
+        // All together: nothing is lost with the corners.
         let part = each(|i| {
-            let [x, y] = [&axes[0].weight, &axes[1].weight];
-            (x[1][i] * y[1][i] + x[1][i] * (y[0][i] + y[2][i]) + y[1][i] * (x[0][i] + x[2][i])).sqrt().recip()
+            let (x, y) = (x1[i] + x2[i], y1[i] + y2[i]);
+            1.0 / (x * y + x * (y0[i] + y3[i]) + y * (x0[i] + x3[i]))
         });
-        for weight in axes.iter_mut().flat_map(|axis| &mut axis.weight) {
-            *weight = each(|i| weight[i] * part[i]);
+        for of_row in &mut rows {
+            for i in 0..LANES {
+                of_row[i] *= part[i];
+            }
         }
-        Self(axes)
+        Self { base, columns, rows }
     }
 
     /// Place of one of its [reads](SPLINE_READS) and its weight.
     #[inline(always)]
     pub fn read(&self, [x, y]: [usize; 2]) -> (Lanes2, Lanes) {
-        let [across, down] = &self.0;
-        let at_px = Lanes2 { x: across.at_px[x], y: down.at_px[y] };
-        (at_px, each(|i| across.weight[x][i] * down.weight[y][i]))
+        let ([x_px, x], [y_px, y]) = (of_read(&self.base.x, &self.columns, x), of_read(&self.base.y, &self.rows, y));
+        (Lanes2 { x: x_px, y: y_px }, each(|i| x[i] * y[i]))
     }
 }
 
-impl Axis {
-    #[inline(always)]
-    fn around(at_px: &Lanes, softness: &Lanes) -> Self {
-        let base = each(|i| at_px[i].floor());
-        let weights = |i: usize| {
-            let f = at_px[i] - base[i];
-            let g = 1.0 - f;
-            let mix = |sharp: f32, soft: f32| sharp + softness[i] * (soft - sharp);
-            [
-                mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0),
-                mix(1.0 + f * f * (-2.5 + 1.5 * f), (4.0 + f * f * (3.0 * f - 6.0)) / 6.0),
-                mix(f * (0.5 + f * (2.0 - 1.5 * f)), (4.0 + g * g * (3.0 * g - 6.0)) / 6.0),
-                mix(f * f * (-0.5 + 0.5 * f), f * f * f / 6.0),
-            ]
-        };
-        Self {
-            at_px: [
-                each(|i| base[i] - 1.0),
-                each(|i| {
-                    let [_, w1, w2, _] = weights(i);
-                    base[i] + w2 / (w1 + w2)
-                }),
-                each(|i| base[i] + 2.0),
-            ],
-            weight: [each(|i| weights(i)[0]), each(|i| weights(i)[1] + weights(i)[2]), each(|i| weights(i)[3])],
-        }
+/// Weights along an axis of the texels before, at, and after `base`.
+#[inline(always)]
+fn weights(at_px: &Lanes, base: &Lanes, softness: &Lanes) -> [Lanes; 4] {
+    let mut weights = [ZERO; 4];
+    for i in 0..LANES {
+        let f = at_px[i] - base[i];
+        let g = 1.0 - f;
+        let mix = |sharp: f32, soft: f32| sharp + softness[i] * (soft - sharp);
+        weights[0][i] = mix(f * (-0.5 + f * (1.0 - 0.5 * f)), g * g * g / 6.0);
+        weights[1][i] = mix(1.0 + f * f * (-2.5 + 1.5 * f), (4.0 + f * f * (3.0 * f - 6.0)) / 6.0);
+        weights[2][i] = mix(f * (0.5 + f * (2.0 - 1.5 * f)), (4.0 + g * g * (3.0 * g - 6.0)) / 6.0);
+        weights[3][i] = mix(f * f * (-0.5 + 0.5 * f), f * f * f / 6.0);
+    }
+    weights
+}
+
+/// Of one axis: place and weight of the read before, of the one between and of the one after.
+#[inline(always)]
+fn of_read(base: &Lanes, [before, first, second, after]: &[Lanes; 4], which: usize) -> [Lanes; 2] {
+    match which {
+        0 => [each(|i| base[i] - 1.0), *before],
+        1 => [each(|i| base[i] + second[i] / (first[i] + second[i])), each(|i| first[i] + second[i])],
+        _ => [each(|i| base[i] + 2.0), *after],
     }
 }
 

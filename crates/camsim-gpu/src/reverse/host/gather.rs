@@ -4,7 +4,7 @@ use camsim_core::plan::PathStage;
 
 use super::{
     Reads,
-    footprint::{Footprint, SPLINE_READS, Spline},
+    footprint::{Footprint, Spline},
     ideal::Halves,
     source::{Nodes, Pose, Source},
 };
@@ -204,9 +204,6 @@ impl Reads<'_> {
             self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), |i| is_taken(i) && is_wide(i), |_| 1.0, sum);
         }
         let spline = Spline::around(at_px, softness);
-        for read in SPLINE_READS {
-            let (at_px, weight) = spline.read(read);
-            self.ideal.add_color(vectors, self.frame, &at_px, |i| is_taken(i) && !is_wide(i), |i| weight[i], sum);
-        }
+        self.ideal.add_spline(vectors, self.frame, &spline, |i| is_taken(i) && !is_wide(i), sum);
     }
 }

@@ -1,5 +1,6 @@
 //! Reads of the ideal frame.
 
+use super::footprint::{SPLINE_READS, Spline};
 use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole, within};
 use crate::host::vectors::Vectors;
 use crate::layout::FrameUniforms;
@@ -96,9 +97,115 @@ impl IdealOnHost<'_> {
     }
 }
 
+impl IdealOnHost<'_> {
+    /// Adds splines of linear colour for each pixel that takes one.
+    #[inline(always)]
+    pub(super) fn add_spline(
+        &self,
+        vectors: impl Vectors,
+        frame: &FrameUniforms,
+        spline: &Spline,
+        is_taken: impl Fn(usize) -> bool,
+        sum: &mut [Halves; LANES],
+    ) {
+        let Spline { base, columns, rows } = spline;
+        let [right, bottom] = frame.ideal_size_px.map(|size| size as f32 - 3.0);
+        let mut is_within = true;
+        for i in 0..LANES {
+            is_within &= !is_taken(i) | ((base.x[i] >= 1.0) & (base.x[i] <= right) & (base.y[i] >= 1.0) & (base.y[i] <= bottom));
+        }
+        if !is_within {
+            // Texels beyond the frame are those of its border: reads see to that.
+            for read in SPLINE_READS {
+                let (at_px, weight) = spline.read(read);
+                self.add_color(vectors, frame, &at_px, &is_taken, |i| weight[i], sum);
+            }
+            return;
+        }
+        let stride = CHANNELS * self.color_stride as usize;
+        for i in 0..LANES {
+            if !is_taken(i) {
+                continue;
+            }
+            let first = (whole(base.y[i]) - 1) as usize * stride + CHANNELS * (whole(base.x[i]) - 1) as usize;
+            let Some(texels) = self.color.get(first..first + 3 * stride + 4 * CHANNELS) else { continue };
+            let pair = |row: usize, column: usize| vectors.numbers(pair_at(texels, row * stride + CHANNELS * column));
+            let middle = [pair(0, 1), pair(3, 1)];
+            let (left, right) = ([pair(1, 0), pair(2, 0)], [pair(1, 2), pair(2, 2)]);
+            let [w0, w1, w2, w3] = [rows[0][i], rows[1][i], rows[2][i], rows[3][i]];
+            for k in 0..2 * CHANNELS {
+                // Left ones of pairs come first.
+                let of = |column: usize| if k < CHANNELS { columns[column][i] } else { columns[column + 1][i] };
+                let outer = w3.mul_add(middle[1][k], w0 * middle[0][k]);
+                let of_left = w2.mul_add(left[1][k], w1 * left[0][k]);
+                let of_right = w2.mul_add(right[1][k], w1 * right[0][k]);
+                sum[i][k] += of(2).mul_add(of_right, of(0).mul_add(of_left, of(1) * outer));
+            }
+        }
+    }
+}
+
+/// Two texels.
+#[inline(always)]
+fn pair_at(values: &[u16], at: usize) -> [u16; 2 * CHANNELS] {
+    values.get(at..).and_then(|values| values.first_chunk()).copied().unwrap_or_default()
+}
+
 /// The first and the last values of so many from a place on; zeros beyond the end, where no place within the frame leads.
 #[inline(always)]
 fn ends<T: Copy + Default, const N: usize>(values: &[T], at: usize, span: usize) -> [[T; N]; 2] {
     let of = values.get(at..at + span).and_then(|values| Some([*values.first_chunk()?, *values.last_chunk()?]));
     of.unwrap_or([[T::default(); N]; 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use bytemuck::Zeroable;
+
+    use super::*;
+    use crate::host::vectors::widest;
+
+    #[test]
+    fn splines_are_the_five_reads_that_they_stand_for() {
+        let (width, height, stride) = (70, 45, 75);
+        let value = |i: usize| half::f16::from_f32((i as f32 * 0.618_034).fract() + 0.1).to_bits();
+        let color: Vec<u16> = (0..CHANNELS * stride * height).map(value).collect();
+        let ideal = IdealOnHost { color: &color, color_stride: stride as u32, depth: &[], depth_stride: 0 };
+        let frame = FrameUniforms { ideal_size_px: [width, height as u32], ..Zeroable::zeroed() };
+        let part = |i: usize, step: f32| (i as f32 * step).fract();
+        let (mut within, mut beside) = (0, 0);
+        for block in 0..400 {
+            // All over the frame, and beyond it.
+            let place = |i: usize| block * LANES + i;
+            let at_px = Lanes2 {
+                x: each(|i| {
+                    if block.is_multiple_of(2) { 1.0 + 66.9 * part(place(i), 0.754_878) } else { -4.0 + 78.0 * part(place(i), 0.754_878) }
+                }),
+                y: each(|i| {
+                    if block.is_multiple_of(2) { 1.0 + 41.9 * part(place(i), 0.569_84) } else { -4.0 + 53.0 * part(place(i), 0.569_84) }
+                }),
+            };
+            let softness = Lanes2 { x: each(|i| part(place(i), 0.324_718)), y: each(|i| part(place(i), 0.220_744)) };
+            let spline = Spline::around(&at_px, &softness);
+            let is_taken = |i: usize| !(block + i).is_multiple_of(7);
+            let (mut found, mut exact) = ([[0.0; 8]; LANES], [[0.0; 8]; LANES]);
+            widest!(vectors => {
+                ideal.add_spline(vectors, &frame, &spline, is_taken, &mut found);
+                for read in SPLINE_READS {
+                    let (at_px, weight) = spline.read(read);
+                    ideal.add_color(vectors, &frame, &at_px, is_taken, |i| weight[i], &mut exact);
+                }
+            });
+            for i in 0..LANES {
+                for k in 0..CHANNELS {
+                    let [found, exact] = [found[i], exact[i]].map(|of| of[k] + of[k + CHANNELS]);
+                    assert!((found - exact).abs() < 2e-6, "{block} {i} {k}: {found} {exact}");
+                    assert_eq!(found == 0.0, !is_taken(i));
+                }
+            }
+            let is_within = (0..LANES).all(|i| at_px.x[i] >= 1.0 && at_px.x[i] < 68.0 && at_px.y[i] >= 1.0 && at_px.y[i] < 43.0);
+            (within, beside) = if is_within { (within + 1, beside) } else { (within, beside + 1) };
+        }
+        assert!(within >= 200 && beside >= 100, "{within} {beside}");
+    }
 }
