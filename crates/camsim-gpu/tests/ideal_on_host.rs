@@ -246,10 +246,12 @@ fn the_host_draws_what_the_device_draws() {
         plans.push(assert_same(name, &engines, &sequence, 2, None));
     }
     let coarse = &[("quality.ideal_scale", "1.0"), ("quality.max_error_dn", "0.1")][..];
+    let sharp = &[("quality.ideal_scale", "1.41"), ("camera.shutter.exposure_ms", "0")];
     for (file, sets, frames) in [
         ("assets/demo.toml", &[][..], [3, 70]),
         ("assets/demo.toml", coarse, [3, 70]),
         ("benches/all_effects.toml", &[], [52, 98]),
+        ("benches/all_effects.toml", sharp, [52, 60]),
         ("benches/houses.toml", &[], [8, 40]),
         ("benches/houses.toml", coarse, [8, 40]),
     ] {

@@ -1,9 +1,9 @@
-//! What ways of sampling cost: milliseconds that a frame of 640x480 takes, by the clock, on two processor cores with llvmpipe. Other machines have other
+//! What ways of sampling cost: milliseconds that a frame of 640x480 takes, by the clock, on two processor cores without a GPU. Other machines have other
 //! times; plans are compared by their ratios.
 //!
-//! From the times of the ideal and the reverse pass of nine cases of `camsim bench`, `benches/all_effects.toml` and `benches/houses.toml`, each with ideal
-//! frames of 1 to 2.83 times the camera's scale, all ways of reading surfaces and the ideal frame, and 2 to 40 samples of the exposure
-//! (docs/PERFORMANCE.md, "What the plan takes things to cost").
+//! From the times that the host takes for ideal frames and what is made from them in `benches/all_effects.toml` and `benches/houses.toml`, with an exposure and without,
+//! and in two cases of `camsim bench`, each with ideal frames of 1 to 2.5 times the camera's scale, all ways of reading surfaces and the ideal frame, and 3 or 16 samples of the exposure;
+//! and from the device's for rays at silhouettes (docs/PERFORMANCE.md, "What the plan takes things to cost").
 
 use glam::DMat2;
 
@@ -20,32 +20,34 @@ use crate::{
 
 /// Of an ideal pixel for each of the camera's: what any takes, each read of a surface's picture, what it takes more to read two of its smaller
 /// versions, and to find out how many reads there are.
-const IDEAL_MS: f64 = 3.0;
-const SURFACE_READ_MS: f64 = 1.2;
-const TWO_VERSIONS_MS: f64 = 1.4;
-const ANY_READS_MS: f64 = 1.8;
-/// Of drawing a thousand triangles; and at most, for ideal frames of the camera's scale and for each time that: their level of detail and what is in
+const IDEAL_MS: f64 = 1.6;
+const SURFACE_READ_MS: f64 = 0.4;
+const TWO_VERSIONS_MS: f64 = 0.2;
+const ANY_READS_MS: f64 = 0.7;
+/// Of choosing and drawing a thousand triangles; and at most, for any ideal frame and for each time that it is as fine as the camera: their level of detail and what is in
 /// view leave no more. Of the terrain, and of models.
-const TRIANGLES_MS: f64 = 0.17;
-const TERRAIN_MS: [f64; 2] = [3.0, 9.0];
-const MODELS_MS: [f64; 2] = [25.0, 13.0];
+const TRIANGLES_MS: f64 = 0.04;
+const TERRAIN_MS: [f64; 2] = [0.8, 3.7];
+const MODELS_MS: [f64; 2] = [2.5, 2.0];
 /// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
-const READ_MS: f64 = 1.0;
-const SPLINE_MS: f64 = 6.5;
-const GRID_MS: [f64; 2] = [5.0, 1.5];
-const EITHER_MS: [f64; 2] = [11.0, 1.4];
+const READ_MS: f64 = 0.24;
+const SPLINE_MS: f64 = 1.0;
+const GRID_MS: [f64; 2] = [1.2, 0.4];
+const EITHER_MS: [f64; 2] = [1.3, 0.8];
 /// Of reading it over an exposure, and for each sample: the kernel that knows splines and grids takes the time of both.
-const SPLINE_SAMPLES_MS: [f64; 2] = [5.0, 4.4];
-const GRID_SAMPLES_MS: [f64; 2] = [1.0, 1.5];
-const EITHER_SAMPLES_MS: [f64; 2] = [6.0, 6.7];
+const SPLINE_SAMPLES_MS: [f64; 2] = [1.0, 0.75];
+const GRID_SAMPLES_MS: [f64; 2] = [1.5, 0.38];
+const EITHER_SAMPLES_MS: [f64; 2] = [2.0, 0.77];
 /// Of a pixel whatever it reads, and for each time that the ideal frame is finer, since fewer reads then find a pixel that is at hand already; and both
 /// where a lens bends rows.
-const ANY_MS: [f64; 2] = [3.5, 0.6];
-const BENT_MS: [f64; 2] = [7.0, 4.0];
-/// Of rays at silhouettes: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes each of a pixel's rays, and more
+const ANY_MS: [f64; 2] = [1.5, 0.8];
+const BENT_MS: [f64; 2] = [3.7, 2.3];
+/// Frames with rays at silhouettes are the device's, which takes so many times what the host does.
+const ON_DEVICE: f64 = 3.0;
+/// Of the rays: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes each of a pixel's rays, and more
 /// where their samples are coarse.
-const MARKS_MS: f64 = 10.0;
-const RAYS_MS: [f64; 2] = [8.0, 12.0];
+const MARKS_MS: f64 = 6.0;
+const RAYS_MS: [f64; 2] = [4.7, 7.0];
 
 /// What the triangles of a scene take to draw.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +80,13 @@ pub(super) struct Price {
     pub ideal_ms: f64,
 }
 
+impl Price {
+    /// The same with rays at silhouettes that take so long.
+    pub fn with_rays(self, rays_ms: f64) -> Self {
+        Self { ms: ON_DEVICE * self.ms + rays_ms, ideal_ms: ON_DEVICE * self.ideal_ms }
+    }
+}
+
 impl Prospect<'_> {
     /// Of a way, with so many pixels drawn of the ideal frame at scale 1 for each of the camera's.
     pub fn price(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> Price {
@@ -108,7 +117,8 @@ impl Prospect<'_> {
     pub fn rays_ms(&self, share: f64, scale: f64, fine: u32, rays: u32, ideal_share: f64) -> f64 {
         let finer = scale * f64::from(fine);
         let [least_ms, coarse_ms] = RAYS_MS;
-        ideal_share * (self.drawn.ms(finer) + finer * finer * MARKS_MS) + share * f64::from(rays) * (least_ms + coarse_ms / finer)
+        ideal_share * (ON_DEVICE * self.drawn.ms(finer) + finer * finer * MARKS_MS)
+            + share * f64::from(rays) * (least_ms + coarse_ms / finer)
     }
 
     /// Over the places.

@@ -105,8 +105,8 @@ pub(super) struct Way {
 }
 
 /// Of a camera of its own for each line, and of a look-up of depth, milliseconds as in `costs.rs`: from its reverse passes, less their reads.
-const POSE_MS: f64 = 0.8;
-const LOOK_UP_MS: f64 = 1.2;
+const POSE_MS: f64 = 0.05;
+const LOOK_UP_MS: f64 = 0.25;
 
 impl Way {
     /// Look-ups of depth, if those at mid-exposure are all that there are.

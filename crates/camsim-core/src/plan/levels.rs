@@ -32,7 +32,7 @@ pub(super) const SAFETY: f64 = 1.2;
 /// Eight-bit textures, their smaller versions and the filter's weights, 1/255 of the linear range.
 const FORMAT_DN: f64 = 0.12;
 /// Scales of the ideal frame that are tried, of the camera's.
-const SCALES: [f64; 12] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, FINEST_SCALE];
+const SCALES: [f64; 14] = [1.0, 1.2, 1.41, 1.6, 1.8, MOST_SCALE, 2.25, 2.5, 2.83, 3.2, 3.6, 4.0, 4.5, FINEST_SCALE];
 /// Beyond it only for silhouettes.
 pub(super) const MOST_SCALE: f64 = 2.0;
 /// As many pixels along a side of one of the camera's as are read.
@@ -48,9 +48,9 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 /// Most samples on one polynomial of the path.
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
-const MOST_TAPS: u32 = 4;
+const MOST_TAPS: u32 = 5;
 /// Those that are tried.
-const CAPS: [u32; 3] = [2, 3, MOST_TAPS];
+const CAPS: [u32; 4] = [2, 3, 4, MOST_TAPS];
 /// Where no way keeps a tolerance: times the least error there is.
 pub(super) const NEARLY: f64 = 1.15;
 /// By how much a way may cost more because it leaves no error: costs are not known better, and of two that are alike the more exact one wins.

@@ -209,8 +209,7 @@ impl WithRays<'_> {
         });
         let scale = choice.sampling.scale;
         let rays_ms = prospect.rays_ms(outlook.share, scale, fine, count(scale, &rays), task.ideal_share);
-        let price = Price { ms: choice.price.ms + rays_ms, ..choice.price };
-        Choice { price, ..choice }
+        Choice { price: choice.price.with_rays(rays_ms), ..choice }
     }
 }
 
