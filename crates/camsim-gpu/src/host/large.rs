@@ -125,11 +125,13 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn what_holds_a_large_page_begins_at_one() {
-        for (len, is_large) in [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)] {
+    fn pages_begin_at_a_large_one() {
+        for (len, may_have_pages) in [(0, false), (1000, false), ((1 << 18) - 1, false), (1 << 18, true), (3_000_001, true)] {
             let numbers: Large<f64> = Large::zeros(len);
-            assert_eq!(matches!(numbers, Large::Pages(..)), is_large, "{len}");
-            assert!(!is_large || numbers.as_ptr().align_offset(2 << 20) == 0, "{len}");
+            // A system need not have large pages.
+            let has_pages = matches!(numbers, Large::Pages(..));
+            assert!(may_have_pages || !has_pages, "{len}");
+            assert!(!has_pages || numbers.as_ptr().align_offset(2 << 20) == 0, "{len}");
         }
     }
 }
