@@ -213,8 +213,8 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     );
     check.count("quality.blur_samples", quality.blur_samples, MAX_BLUR_SAMPLES);
     check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
-    check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=4.0).contains(&scale)), "quality.ideal_scale", || {
-        "must be 1 to 4 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
+    check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)), "quality.ideal_scale", || {
+        "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
     });
     check.require((1..=MAX_FRAMES_PER_IDEAL).contains(&quality.frames_per_ideal), "quality.frames_per_ideal", || {
         format!("must be 1 (each frame its own) to {MAX_FRAMES_PER_IDEAL}, not {}; 8 is the default", quality.frames_per_ideal)
@@ -417,6 +417,7 @@ mod tests {
             ("quality.footprint_taps", |s| s.quality.footprint_taps = Auto::Value(MAX_FOOTPRINT_TAPS + 1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(MAX_ITERATIONS + 1)),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(0.5)),
+            ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(5.1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),
             ("quality.iterations", |s| {
                 s.quality.iterations = Auto::Value(2);
