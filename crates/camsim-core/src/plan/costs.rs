@@ -34,7 +34,7 @@ const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;
 const GRID_MS: [f64; 2] = [1.2, 0.4];
 const EITHER_MS: [f64; 2] = [1.3, 0.8];
-/// Of reading it over an exposure, and for each sample: the kernel that knows splines and grids takes the time of both.
+/// Of reading it over an exposure, and for each sample.
 const SPLINE_SAMPLES_MS: [f64; 2] = [1.0, 0.75];
 const GRID_SAMPLES_MS: [f64; 2] = [1.5, 0.38];
 const EITHER_SAMPLES_MS: [f64; 2] = [2.0, 0.77];
@@ -42,7 +42,7 @@ const EITHER_SAMPLES_MS: [f64; 2] = [2.0, 0.77];
 /// where a lens bends rows.
 const ANY_MS: [f64; 2] = [1.5, 0.8];
 const BENT_MS: [f64; 2] = [3.7, 2.3];
-/// Frames with rays at silhouettes are the device's, which takes so many times what the host does.
+/// Frames with rays at silhouettes are the device's, which takes one to five times what the host does, by scene.
 const ON_DEVICE: f64 = 3.0;
 /// Of the rays: of an ideal pixel for each of the camera's its samples and marks, and of a picture that is all silhouettes each of a pixel's rays, and more
 /// where their samples are coarse.

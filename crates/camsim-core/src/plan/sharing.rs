@@ -79,7 +79,7 @@ impl<'a> Candidates<'a> {
         scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale).then(|| (look.clone(), scenery))
     }
 
-    /// How a frame would be sampled by itself, for a part of `quality.max_error_dn`.
+    /// How a frame's picture would be made from the common ideal frame, sampled as it needs for a part of `quality.max_error_dn`.
     fn picture(&self, frame: u64, share_of_dn: f64) -> Option<Picture> {
         let (look, scenery) = self.see(frame, None)?;
         Some(look.asking(Asked { share_of_dn, given: None }).picture(scenery))

@@ -95,9 +95,7 @@ impl IdealOnHost<'_> {
             }
         }
     }
-}
 
-impl IdealOnHost<'_> {
     /// Adds splines of linear colour for each pixel that takes one.
     #[inline(always)]
     pub(super) fn add_spline(
@@ -199,6 +197,7 @@ mod tests {
             for i in 0..LANES {
                 for k in 0..CHANNELS {
                     let [found, exact] = [found[i], exact[i]].map(|of| of[k] + of[k + CHANNELS]);
+                    // Some twenty roundings of numbers of about 1.
                     assert!((found - exact).abs() < 2e-6, "{block} {i} {k}: {found} {exact}");
                     assert_eq!(found == 0.0, !is_taken(i));
                 }

@@ -3,8 +3,10 @@
 use camsim_core::camera::INVALID_UV;
 
 use super::footprint::scaled;
-use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each};
-use crate::host::large::Large;
+use crate::host::{
+    lanes::{LANES, Lanes, Lanes2, ZERO, each},
+    large::Large,
+};
 use crate::layout::FrameUniforms;
 
 /// Above this a lens map says "no pre-image".
@@ -135,7 +137,7 @@ mod tests {
             let [x, y] = [i % size_px[0], i / size_px[0]].map(|n| n as f32);
             *uv = [0.01 * x + 1e-4 * x * y, 0.01 * y - 2e-5 * x * x];
         }
-        // Without a ray: within a block, beside one, and whole corners of the picture.
+        // Without a ray: within a block, beside one, and in corners of the picture.
         for [x, y] in [[40, 20], [95, 30], [31, 10], [0, 0], [132, 39]] {
             map.uv[(y * size_px[0] + x) as usize] = [INVALID_UV; 2];
         }
