@@ -372,6 +372,7 @@ impl Planner {
             blur,
             edges,
             surface_reads: sampling.surface_reads,
+            samples_a_pixel: sampling.samples_a_pixel,
             taps: sampling.taps,
             linear_fog: if look.is_paper() { paper::fog(&self.sequence.scene) } else { None },
             truth: self.truth,

@@ -201,6 +201,8 @@ pub struct QualitySpec {
     pub footprint_taps: Auto<u32>,
     /// Pixels of the ideal frame for each of the camera's, along a side.
     pub ideal_scale: Auto<f64>,
+    /// Samples of each pixel of the ideal frame, 1 or 4: with several, borders are known to a part of a pixel.
+    pub ideal_samples: Auto<u32>,
     /// Ideal frames per output frame.
     pub key_frames: Auto<u32>,
     /// Output frames that may be made from one ideal frame, at most [`MAX_FRAMES_PER_IDEAL`].
@@ -223,6 +225,7 @@ impl Default for QualitySpec {
             blur_samples: Auto::Auto,
             footprint_taps: Auto::Auto,
             ideal_scale: Auto::Auto,
+            ideal_samples: Auto::Auto,
             key_frames: Auto::Auto,
             frames_per_ideal: frames_per_ideal(),
             silhouettes: Silhouettes::Auto,

@@ -50,6 +50,12 @@ impl Scene {
         self.meshes.iter().any(|mesh| mesh.material.blends)
     }
 
+    /// Whether all borders are those of triangles: no surface is mixed with what is behind it or has holes by its picture.
+    #[must_use]
+    pub fn has_borders_of_triangles(&self) -> bool {
+        self.meshes.iter().all(|mesh| !mesh.material.blends && mesh.material.cutoff.is_none())
+    }
+
     /// Boxes around all meshes, NED.
     #[must_use]
     pub fn mesh_bounds(&self) -> Vec<Aabb> {

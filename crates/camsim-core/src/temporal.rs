@@ -15,9 +15,11 @@ pub mod lines;
 pub mod marks;
 pub mod paper;
 pub mod path;
+mod samples;
 
 pub(crate) use footprint::TENT_PX2;
 pub use footprint::{Footprint, TapStage, tap_shares};
+pub use samples::{SAMPLE_PLACES, SAMPLES, middle_depth};
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]

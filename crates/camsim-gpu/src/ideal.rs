@@ -27,6 +27,7 @@ mod layers;
 mod marks;
 mod near_marks;
 mod pipelines;
+mod sampled;
 mod surfaces;
 
 pub(crate) use fine::whole;
@@ -41,6 +42,7 @@ use pipelines::{SurfaceKey, SurfacePipelines};
 #[cfg(test)]
 #[cfg(test)]
 pub(crate) use pipelines::{ground_slots, mesh_slots};
+use sampled::{MiddleDepthPass, SampledTarget};
 use surfaces::{TerrainSlot, Triangles, draw_meshes, draw_terrain, place_meshes, place_terrain};
 
 /// Colour format of the ideal frame.
@@ -65,6 +67,8 @@ pub struct IdealTarget {
     pub depth: wgpu::Texture,
     /// What frames with silhouettes have besides.
     pub fine: Option<FineTarget>,
+    /// What frames of several samples a pixel are drawn to first.
+    sampled: Option<SampledTarget>,
     /// What surfaces are drawn to with one sample a pixel.
     drawn_color: wgpu::TextureView,
     drawn_depth: wgpu::TextureView,
@@ -83,25 +87,28 @@ impl IdealTarget {
         [width, key_rows(&plan.ideal) * plan.keys.len() as u32].map(|side| side.min(max_side_px))
     }
 
-    /// Whether a frame of this size and edge stage is drawn to it.
+    /// Whether the ideal frames of a plan, which take this size, are drawn to it.
     #[must_use]
-    pub fn serves(&self, allocated_px: [u32; 2], edges: EdgeStage) -> bool {
-        self.allocated_px == allocated_px && self.fine.as_ref().map(|fine| fine.scale) == scale_of(edges)
+    pub fn serves(&self, allocated_px: [u32; 2], plan: &FramePlan) -> bool {
+        self.allocated_px == allocated_px
+            && self.fine.as_ref().map(|fine| fine.scale) == scale_of(plan.edges)
+            && self.sampled.is_some() == (plan.samples_a_pixel > 1)
     }
 
     /// Allocates.
     #[must_use]
-    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], edges: EdgeStage, preset: Preset) -> Self {
-        let fine = scale_of(edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
+    pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], plan: &FramePlan) -> Self {
+        let fine = scale_of(plan.edges).map(|scale| FineTarget::new(gpu, allocated_px, scale));
+        let sampled = (plan.samples_a_pixel > 1).then(|| SampledTarget::new(gpu, allocated_px));
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(preset), 1, usage);
+        let color = texture(gpu, "camsim.ideal.color", allocated_px, color_format(plan.preset), 1, usage);
         let depth = texture(gpu, "camsim.ideal.depth", allocated_px, DEPTH_FORMAT, 1, usage);
         let format = (color.format() == STORED_FORMAT).then_some(STORED_VIEW);
         // Not every usage of the texture is legal for a view of another format, and the gather needs one only.
         let usage = Some(wgpu::TextureUsages::TEXTURE_BINDING);
         let gathered_color = color.create_view(&wgpu::TextureViewDescriptor { format, usage, ..Default::default() });
         let (drawn_color, drawn_depth, gathered_depth) = (whole(&color), whole(&depth), whole(&depth));
-        Self { allocated_px, color, depth, fine, drawn_color, drawn_depth, gathered_color, gathered_depth }
+        Self { allocated_px, color, depth, fine, sampled, drawn_color, drawn_depth, gathered_color, gathered_depth }
     }
 }
 
@@ -124,6 +131,8 @@ pub fn key_rows(ideal: &IdealGeometry) -> u32 {
 pub struct IdealPass {
     /// Compiled when a silhouette is first in view.
     silhouettes: Option<SilhouettePasses>,
+    /// Compiled when pixels first have several samples.
+    middle_depth: Option<MiddleDepthPass>,
     camera_layout: wgpu::BindGroupLayout,
     terrain_layout: wgpu::BindGroupLayout,
     mesh_layout: wgpu::BindGroupLayout,
@@ -193,6 +202,7 @@ impl IdealPass {
         let placement_layout = layout("camsim.ideal.placements", &[buffer_entry(0, wgpu::ShaderStages::VERTEX, storage)]);
         Ok(Self {
             silhouettes: None,
+            middle_depth: None,
             camera_layout,
             terrain_layout,
             mesh_layout,
@@ -257,7 +267,10 @@ impl IdealPass {
         tolerance: &LevelTolerance,
         target: &IdealTarget,
     ) -> Result<u32, RenderErrorBase> {
-        let plain = SurfaceKey::Plain(plan.surface_reads);
+        let plain = if target.sampled.is_some() { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::Plain(plan.surface_reads) };
+        if target.sampled.is_some() && self.middle_depth.is_none() {
+            self.middle_depth = Some(MiddleDepthPass::new(gpu)?);
+        }
         let colored = target.fine.as_ref().map(|fine| fine.color.is_some());
         let fine = colored.map(|colored| if colored { SurfaceKey::Fine(plan.surface_reads) } else { SurfaceKey::FineDepth });
         for key in [Some(plain), fine].into_iter().flatten() {
@@ -286,10 +299,21 @@ impl IdealPass {
                 out_of_order += layers.out_of_order;
             }
         }
-        let mut pass =
-            recorder.render_pass("ideal", Some(color_attachment(&target.drawn_color, scene)), Some(depth_attachment(&target.drawn_depth)));
+        let (color, depth) = match &target.sampled {
+            None => (color_attachment(&target.drawn_color, scene), &target.drawn_depth),
+            Some(sampled) => {
+                let mut color = color_attachment(&sampled.color, scene);
+                color.resolve_target = Some(&target.drawn_color);
+                color.ops.store = wgpu::StoreOp::Discard;
+                (color, &sampled.depth)
+            }
+        };
+        let mut pass = recorder.render_pass("ideal", Some(color), Some(depth_attachment(depth)));
         self.draw_keys(&mut pass, plain, plan, 1, buffers, slots, |k| Triangles::All(index_counts[k]));
         drop(pass);
+        if let (Some(sampled), Some(middle_depth)) = (&target.sampled, &self.middle_depth) {
+            middle_depth.encode(gpu, recorder, sampled, depth_attachment(&target.drawn_depth));
+        }
         if let (Some(fine), Some(key), Some(passes), EdgeStage::Supersampled { thin, .. }) =
             (&target.fine, fine, &self.silhouettes, plan.edges)
         {

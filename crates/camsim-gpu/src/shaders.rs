@@ -43,6 +43,7 @@ embedded![
     "ideal/reads/grid.wgsl",
     "ideal/reads/one.wgsl",
     "ideal/reads/two.wgsl",
+    "ideal/samples.wgsl",
     "ideal/spread/none.wgsl",
     "ideal/spread/samples.wgsl",
     "ideal/stamp.wgsl",

@@ -82,6 +82,7 @@ fn camera(pitch_deg: f64) -> Scenario {
     scenario.camera.focal_px = [150.0, 140.0];
     scenario.camera.mount = MountSpec { angles_deg: [3.0, pitch_deg, 10.0], ..MountSpec::default() };
     scenario.quality.silhouettes = Silhouettes::Plain;
+    scenario.quality.ideal_samples = Auto::Value(1);
     scenario
 }
 
@@ -256,7 +257,7 @@ fn the_host_draws_what_the_device_draws() {
         ("benches/houses.toml", coarse, [8, 40]),
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file);
-        let sets = [&[("quality.silhouettes", "\"plain\"")], sets]
+        let sets = [&[("quality.silhouettes", "\"plain\""), ("quality.ideal_samples", "1")], sets]
             .concat()
             .iter()
             .map(|&(key, value)| (key.into(), value.into()))
@@ -266,4 +267,54 @@ fn the_host_draws_what_the_device_draws() {
     }
     let reads: HashSet<SurfaceReads> = plans.iter().map(|plan| plan.surface_reads).collect();
     assert!(SurfaceReads::ALL.iter().all(|kind| reads.contains(kind)), "all ways to read: {reads:?}");
+}
+
+/// What frames of four samples a pixel have in common on the host and on the device: share of the pixels that are apart by more than 16/255, and RMS of all, 1/255.
+fn samples_apart(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, frame_number: u64) -> [f64; 2] {
+    let [(by_host, host), (by_device, device)] = engines.each_ref().map(|engine| frame(engine, sequence, frame_number, &[Channel::Color]));
+    assert!(by_host.times.ideal_ms.is_some() && by_device.times.ideal_ms.is_none(), "{name}: each where it should be");
+    assert_eq!((by_host.plan.samples_a_pixel, host.0), (4, device.0), "{name}");
+    let dn: Vec<f64> = host.1.iter().zip(&device.1).map(|(a, b)| 255.0 * f64::from(a - b)).collect();
+    let rms_dn = (dn.iter().map(|dn| dn * dn).sum::<f64>() / (0.75 * dn.len() as f64)).sqrt();
+    let otherwise = dn.chunks_exact(4).filter(|pixel| pixel.iter().any(|dn| dn.abs() > 16.0)).count();
+    let depths = host.2.iter().zip(&device.2).filter(|&(&a, &b)| (a - b).abs() > 1e-3 * a.max(b)).count();
+    let pixels = host.2.len() as f64;
+    eprintln!("{name}: {rms_dn:.3}/255, {:.1e} otherwise, {:.1e} at another depth", otherwise as f64 / pixels, depths as f64 / pixels);
+    [otherwise.max(depths) as f64 / pixels, rms_dn]
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn samples_of_the_host_are_those_of_the_device() {
+    let engines = engines();
+    let camera = |pitch_deg: f64| {
+        let mut scenario = camera(pitch_deg);
+        scenario.quality.ideal_samples = Auto::Value(4);
+        scenario
+    };
+    let light = Light::new(2.5, 0.6, 0.7, 0.3);
+    let finest = |mut scenario: Scenario| {
+        scenario.quality.max_terrain_error_px = 1e-5;
+        scenario
+    };
+    for (name, sequence) in [
+        ("boxes", from_height(camera(-50.0), 90.0, city(6))),
+        ("among boxes", from_height(camera(-10.0), 9.0, city(6))),
+        ("light", from_height(camera(-50.0), 70.0, balls(60, Some(light), |_| ()))),
+        ("one side", from_height(camera(-50.0), 70.0, balls(60, None, |mesh| mesh.material.one_sided = true))),
+        // More than are drawn at once.
+        ("a million triangles", from_height(finest(camera(-50.0)), 70.0, balls(2000, Some(light), |_| ()))),
+    ] {
+        let [otherwise, rms_dn] = samples_apart(name, &engines, &sequence, 2);
+        assert!(otherwise < 2e-3 && rms_dn < 0.5, "{name}: {otherwise:.1e}, {rms_dn:.3}/255");
+    }
+    for (file, frames) in [("benches/all_effects.toml", [52, 98]), ("benches/houses.toml", [8, 40])] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(file);
+        let sets = [("quality.silhouettes", "\"plain\""), ("quality.ideal_samples", "4")].map(|(key, value)| (key.into(), value.into()));
+        let loaded = load_sequence(&read_scenario(&path, &sets, None).expect("scenario")).expect("sequence");
+        for number in frames {
+            let [otherwise, rms_dn] = samples_apart(file, &engines, &loaded.sequence, number);
+            assert!(otherwise < 2e-3 && rms_dn < 0.5, "{file} {number}: {otherwise:.1e}, {rms_dn:.3}/255");
+        }
+    }
 }

@@ -39,6 +39,7 @@ const SHARE: f64 = 0.9;
 const TIMES_AT: f64 = 6.0;
 /// Part of what borders along whole pixels cost, squared, that is left of it at least, whatever reads the ideal frame.
 const LEAST_LEFT: f64 = 0.1;
+const LEAST_LEFT_BY_SAMPLES: f64 = 0.02;
 /// Lines of three through three by three places, the border's first.
 pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
 
@@ -192,9 +193,10 @@ impl Outlook {
         self.of((self.steps + self.flush + self.feet) * self.places.left(sampling, blur) + self.strips)
     }
 
-    /// About the least that they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's.
-    pub fn plain_at_best(&self, scale: f64) -> Contours {
-        self.of(LEAST_LEFT * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
+    /// About the least that they cost left as they are, whatever reads an ideal frame with so many pixels for each of the camera's; whether those may have several samples.
+    pub fn plain_at_best(&self, scale: f64, may_have_samples: bool) -> Contours {
+        let least_left = if may_have_samples { LEAST_LEFT_BY_SAMPLES } else { LEAST_LEFT };
+        self.of(least_left * (self.steps + self.flush + self.feet) * self.places.along_whole_pixels(scale) + self.strips)
     }
 
     fn of(&self, square: f64) -> Contours {
@@ -417,7 +419,7 @@ pub(super) mod tests {
         assert!((found.flush / expected - 1.0).abs() < 0.1, "{} {expected}", found.flush);
         assert_eq!(found.steps, 0.0);
         let [plain, rays] = [found.plain(&read_at(2.0), None), found.with_rays(&read_at(2.0), None, 2, u32::MAX)].map(|of| of.error_dn);
-        let left = stairs::left(&stairs::Reading { width_px: 2.0, taps: TapStage::Bilinear, exposure: None });
+        let left = stairs::left(&stairs::Reading { width_px: 2.0, taps: TapStage::Bilinear, samples_a_pixel: 1, exposure: None });
         let rays_alike = rays * SAFETY / SAFETY_WITH_RAYS / found.once_a_pixel.sqrt();
         assert!((plain - rays_alike).abs() < 1e-9 && (plain - 255.0 * (left * found.flush).sqrt()).abs() < 1e-9, "{plain} {rays}");
     }
@@ -479,10 +481,11 @@ pub(super) mod tests {
         assert!(with_rays(1.0, 1).error_dn < still.plain(&spline(1.0), None).error_dn);
         assert_eq!(with_rays(2.0, 1), with_rays(1.0, 2));
         // What nothing can leave less of lets nobody think that more would be left.
-        for scale in [1.0, 1.41, 2.0, 2.83, 4.0] {
-            for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 4 }] {
-                let plain = still.plain(&Sampling { taps, ..read_at(scale) }, None);
-                assert!(still.plain_at_best(scale).error_dn < plain.error_dn, "{scale} {taps:?}");
+        for (scale, samples_a_pixel) in [1.0, 1.41, 2.0, 2.83, 4.0, 5.0].into_iter().flat_map(|scale| [(scale, 1), (scale, 4)]) {
+            for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 5 }] {
+                let plain = still.plain(&Sampling { taps, samples_a_pixel, ..read_at(scale) }, None);
+                let at_best = still.plain_at_best(scale, samples_a_pixel > 1);
+                assert!(at_best.error_dn < plain.error_dn, "{scale} {samples_a_pixel} {taps:?}");
             }
         }
     }

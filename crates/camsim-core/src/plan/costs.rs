@@ -29,6 +29,9 @@ const ANY_READS_MS: f64 = 0.7;
 const TRIANGLES_MS: f64 = 0.04;
 const TERRAIN_MS: [f64; 2] = [0.8, 3.7];
 const MODELS_MS: [f64; 2] = [2.5, 2.0];
+/// What several samples a pixel take more, for any ideal frame and each of its pixels for one of the camera's: of the terrain, and of models.
+const TERRAIN_SAMPLES_MS: [f64; 2] = [0.5, 0.7];
+const MODELS_SAMPLES_MS: [f64; 2] = [2.0, 2.0];
 /// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
 const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;
@@ -71,6 +74,12 @@ impl Drawn {
         let at_most = |[least, times]: [f64; 2]| least + times * scale;
         self.terrain_ms.min(at_most(TERRAIN_MS)) + self.models_ms.min(at_most(MODELS_MS))
     }
+
+    /// Of several samples a pixel, more.
+    fn samples_ms(self, scale: f64) -> f64 {
+        let at_most = |[least, times]: [f64; 2]| least + times * scale * scale;
+        self.terrain_ms.min(at_most(TERRAIN_SAMPLES_MS)) + self.models_ms.min(at_most(MODELS_SAMPLES_MS))
+    }
 }
 
 /// The whole price of a way, and the part of it that the ideal frame takes.
@@ -90,14 +99,15 @@ impl Price {
 impl Prospect<'_> {
     /// Of a way, with so many pixels drawn of the ideal frame at scale 1 for each of the camera's.
     pub fn price(&self, sampling: &Sampling, blur: Option<BlurStage>, ideal_share: f64) -> Price {
-        let ideal_ms = self.ideal_ms(sampling.scale, sampling.surface_reads, ideal_share);
+        let ideal_ms = self.ideal_ms(sampling, ideal_share);
         Price { ms: ideal_ms + self.read_ms(sampling.scale, sampling.taps, blur), ideal_ms }
     }
 
     /// Of the ideal frame.
-    pub fn ideal_ms(&self, scale: f64, reads: SurfaceReads, ideal_share: f64) -> f64 {
-        let a_px = self.mean(|sight| surface_ms(sight.texel_from_key * scale.recip(), reads));
-        ideal_share * (self.drawn.ms(scale) + scale * scale * a_px)
+    pub fn ideal_ms(&self, &Sampling { scale, surface_reads, samples_a_pixel, .. }: &Sampling, ideal_share: f64) -> f64 {
+        let a_px = self.mean(|sight| surface_ms(sight.texel_from_key * scale.recip(), surface_reads));
+        let samples_ms = if samples_a_pixel > 1 { self.drawn.samples_ms(scale) } else { 0.0 };
+        ideal_share * (self.drawn.ms(scale) + scale * scale * a_px + samples_ms)
     }
 
     /// Of reading it.

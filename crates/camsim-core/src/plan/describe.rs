@@ -53,6 +53,8 @@ pub struct PlanSummary<'a> {
     pub edges: EdgeStage,
     /// What reads the surfaces' pictures for the ideal frame.
     pub surface_reads: SurfaceReads,
+    /// Samples of each pixel of the ideal frame.
+    pub samples_a_pixel: u32,
     /// What reads the ideal frame for each sample.
     pub taps: TapStage,
     /// Ideal pixels for each of the camera's.
@@ -85,6 +87,10 @@ impl FramePlan {
             SurfaceReads::Four => "4 texture reads a pixel",
             SurfaceReads::Grid => "up to 2x32 texture reads a pixel",
         };
+        let samples = match self.samples_a_pixel {
+            1 => String::new(),
+            several => format!(" of {several} samples"),
+        };
         let shared = match (self.shared_by, self.alone) {
             (Some([first, last]), _) => format!(", one for frames {first} to {last}"),
             (None, Some(why)) => format!(", for this frame alone ({why})"),
@@ -96,7 +102,7 @@ impl FramePlan {
         }
         let color = if self.preset == Preset::Paper { "rgba8unorm (sRGB as stored)" } else { "rgba16float" };
         let mixed = if self.predicted.layers.is_some() { ", blended surfaces last and from behind to the front" } else { "" };
-        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed), {reads}{mixed}{shared}"));
+        passes.push(format!("ideal: {frames}{width}x{height} px {color} + depth32float (reversed){samples}, {reads}{mixed}{shared}"));
         if let EdgeStage::Supersampled { scale, thin, .. } = self.edges {
             let marks = format!("{width}x{height} px, marked where several surfaces are seen");
             let color = if scale > 1 { "rgba16float + " } else { "" };
@@ -183,6 +189,7 @@ impl FramePlan {
             blur: self.blur,
             edges: self.edges,
             surface_reads: self.surface_reads,
+            samples_a_pixel: self.samples_a_pixel,
             taps: self.taps,
             ideal_scale: self.ideal.focal_px.x / self.camera.focal_px.x,
             motion: self.motion,

@@ -92,6 +92,8 @@ pub struct FramePlan {
     pub edges: EdgeStage,
     /// What reads the surfaces' pictures for the ideal frame.
     pub surface_reads: SurfaceReads,
+    /// Samples of each pixel of the ideal frame: 1, or [`crate::temporal::SAMPLES`] where borders are known to a part of a pixel.
+    pub samples_a_pixel: u32,
     /// What reads the ideal frame for each sample.
     pub taps: TapStage,
     /// Fog after the gather (the paper's); otherwise it is in the ideal frame.

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     scenario::{Auto, Preset, QualitySpec},
-    temporal::{Footprint, TENT_PX2, TapStage, samples_for},
+    temporal::{Footprint, SAMPLES, TENT_PX2, TapStage, samples_for},
 };
 
 /// One place in so many is asked first, and so far above the tolerance these then settle it.
@@ -75,12 +75,15 @@ pub(super) struct Sampling {
     /// Ideal pixels for each of the camera's.
     pub scale: f64,
     pub surface_reads: SurfaceReads,
+    /// Of each ideal pixel.
+    pub samples_a_pixel: u32,
     pub taps: TapStage,
     pub samples_per_px: f64,
     pub expected: Expected,
 }
 
 /// What a sampling is chosen for.
+#[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub quality: &'a QualitySpec,
     /// 1/255 of the linear range, over the picture.
@@ -90,11 +93,24 @@ pub(super) struct Task<'a> {
     pub most_scale: f64,
     /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
     pub ideal_share: f64,
+    /// Whether ideal pixels may have several samples.
+    pub may_have_samples: bool,
     pub exposure: Option<ExposurePath>,
 }
 
 /// What comes to the error of a way of sampling over the picture, 1/255 of the linear range; `None` where that is not to be.
 pub(super) type Beside<'a> = dyn Fn(&Sampling, Option<BlurStage>) -> Option<f64> + 'a;
+
+impl Task<'_> {
+    /// Of each ideal pixel, those that are tried.
+    fn samples(&self) -> &'static [u32] {
+        match (self.may_have_samples, self.quality.ideal_samples) {
+            (false, _) | (_, Auto::Value(1)) => &[1],
+            (true, Auto::Auto) => &[1, SAMPLES],
+            (true, Auto::Value(_)) => &[SAMPLES],
+        }
+    }
+}
 
 /// What was chosen.
 #[derive(Clone, Copy, Debug)]
@@ -160,7 +176,7 @@ impl Prospect<'_> {
     /// The cheapest sampling within the tolerance, or one that is nearly the best there is. `beside_dn` is what comes to it over the picture with a way of
     /// sampling, 1/255; `None` where that is not to be.
     pub fn choose(&self, task: &Task<'_>, beside_dn: &Beside<'_>) -> Choice {
-        let &Task { quality, max_error_dn, least_scale, most_scale, ideal_share, exposure } = task;
+        let &Task { quality, max_error_dn, least_scale, most_scale, ideal_share, exposure, .. } = task;
         let forced = quality.ideal_scale.value();
         let scales = SCALES.iter().filter(|&&scale| scale > 1.05 * least_scale && scale < most_scale);
         let scales: Vec<f64> = forced.map_or_else(|| std::iter::once(least_scale).chain(scales.copied()).collect(), |scale| vec![scale]);
@@ -178,10 +194,12 @@ impl Prospect<'_> {
         let fewest = |sampling: Sampling| way(sampling, choices(sampling.scale).first().copied().unwrap_or(0.0)).1;
         let mut ways: Vec<(f64, Sampling)> = Vec::new();
         for &scale in &scales {
-            let of_ideal = SurfaceReads::ALL.map(|reads| (reads, self.ideal_ms(scale, reads, ideal_share)));
+            let ideals = SurfaceReads::ALL.into_iter().flat_map(|reads| task.samples().iter().map(move |&samples| (reads, samples)));
+            let ideals: Vec<Sampling> = ideals.map(|(reads, samples)| Sampling::of_ideal(scale, reads, samples)).collect();
+            let ideals: Vec<(f64, Sampling)> = ideals.into_iter().map(|ideal| (self.ideal_ms(&ideal, ideal_share), ideal)).collect();
             for taps in self.stages(quality, scale) {
                 let read_ms = self.read_ms(scale, taps, fewest(Sampling::new(scale, SurfaceReads::One, taps)));
-                ways.extend(of_ideal.map(|(reads, ideal_ms)| (ideal_ms + read_ms, Sampling::new(scale, reads, taps))));
+                ways.extend(ideals.iter().map(|&(ideal_ms, ideal)| (ideal_ms + read_ms, Sampling { taps, ..ideal })));
             }
         }
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -408,7 +426,12 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: 
 impl Sampling {
     /// Of which nothing is expected yet.
     pub fn new(scale: f64, surface_reads: SurfaceReads, taps: TapStage) -> Self {
-        Self { scale, surface_reads, taps, samples_per_px: 0.0, expected: Expected::default() }
+        Self { scale, surface_reads, samples_a_pixel: 1, taps, samples_per_px: 0.0, expected: Expected::default() }
+    }
+
+    /// By its ideal frame.
+    fn of_ideal(scale: f64, surface_reads: SurfaceReads, samples_a_pixel: u32) -> Self {
+        Self { samples_a_pixel, ..Self::new(scale, surface_reads, TapStage::Bilinear) }
     }
 
     /// The paper's: one bilinear read a sample.

@@ -51,6 +51,8 @@ pub(super) struct Scenery<'a> {
     pub outlook: Option<contours::Outlook>,
     /// What mixed light costs; `None` where nothing is mixed.
     pub layers: Option<layers::Layers>,
+    /// Whether samples of ideal pixels show all borders: not where pictures have holes, or what is mixed.
+    pub may_have_samples: bool,
 }
 
 impl Planner {
@@ -168,6 +170,7 @@ impl<'a> Look<'a> {
             prospect: prospect::Prospect::new(fixed.as_ref().unwrap_or(reach), sequence, surfaces, grain, shutter, *stamp_s, key_pose),
             outlook: self.outlook(&ideal, reason_for_none.is_none()),
             layers: self.layers(&[self.key()]),
+            may_have_samples: !self.is_paper() && sequence.scene.has_borders_of_triangles(),
             ideal,
             motion,
             reason_for_none,
@@ -256,6 +259,6 @@ impl Scenery<'_> {
     /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
     pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
         let is_auto = quality.silhouettes == Silhouettes::Auto;
-        self.outlook.as_ref().is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale).are_affordable(quality.max_error_dn))
+        self.outlook.as_ref().is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale, self.may_have_samples).are_affordable(quality.max_error_dn))
     }
 }

@@ -68,6 +68,7 @@ impl Look<'_> {
             least_scale: self.reach.least_scale(),
             most_scale: self.most_scale(scenery),
             ideal_share: self.ideal_share(scenery),
+            may_have_samples: false,
             exposure: self.exposed(scenery.motion, &scenery.ideal).path(quality, &mut Vec::new()),
         };
         let Scenery { prospect, outlook, .. } = scenery;
@@ -78,10 +79,11 @@ impl Look<'_> {
             let choice = given.map_or_else(|| prospect.choose(&task, &usual), |given| prospect.given(&given, &task, &usual));
             return Picture::of(&choice, None, false, [1, 0]);
         };
+        let of_plain = Task { may_have_samples: scenery.may_have_samples, ..task };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
-            Some(given) => prospect.given(&given, &task, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
-            None => prospect.choose(&task, &|sampling, blur| {
-                let plain = is_up_to(FINEST_SCALE, sampling.scale, &task).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
+            Some(given) => prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
+            None => prospect.choose(&of_plain, &|sampling, blur| {
+                let plain = is_up_to(FINEST_SCALE, sampling.scale, &of_plain).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
                 Some(plain.error_dn.hypot(layers_dn))
             }),
         };

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec};
-use crate::plan::MAX_KEYS;
+use crate::{plan::MAX_KEYS, temporal::SAMPLES};
 
 mod scene;
 
@@ -213,6 +213,9 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     );
     check.count("quality.blur_samples", quality.blur_samples, MAX_BLUR_SAMPLES);
     check.count("quality.footprint_taps", quality.footprint_taps, MAX_FOOTPRINT_TAPS);
+    check.require(quality.ideal_samples.value().is_none_or(|samples| [1, SAMPLES].contains(&samples)), "quality.ideal_samples", || {
+        format!("must be \"auto\", 1 or {SAMPLES} samples of each pixel of the ideal frame")
+    });
     check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)), "quality.ideal_scale", || {
         "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
     });
@@ -248,6 +251,9 @@ fn check_paper(check: &mut Check, scenario: &Scenario) {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
     check.require(quality.ideal_scale == Auto::Auto, "quality.ideal_scale", || {
+        "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
+    });
+    check.require(matches!(quality.ideal_samples, Auto::Auto | Auto::Value(1)), "quality.ideal_samples", || {
         "is 1 with quality.preset = \"paper\"; leave it out, or write preset = \"default\"".into()
     });
     check.require(quality.silhouettes != Silhouettes::Rays, "quality.silhouettes", || {
@@ -416,6 +422,7 @@ mod tests {
             ("quality.blur_samples", |s| s.quality.blur_samples = Auto::Value(MAX_BLUR_SAMPLES + 1)),
             ("quality.footprint_taps", |s| s.quality.footprint_taps = Auto::Value(MAX_FOOTPRINT_TAPS + 1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(MAX_ITERATIONS + 1)),
+            ("quality.ideal_samples", |s| s.quality.ideal_samples = Auto::Value(2)),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(0.5)),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(5.1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),

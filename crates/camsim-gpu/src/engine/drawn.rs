@@ -27,6 +27,7 @@ pub(super) struct Drawn {
     pub terrain_error_px: f64,
     pub models: LevelTolerance,
     pub surface_reads: SurfaceReads,
+    pub samples_a_pixel: u32,
     /// Where the device has it, if the device has drawn it.
     pub target: Option<usize>,
     /// Whether the host has drawn it.
@@ -59,6 +60,7 @@ impl Session<'_> {
                 && drawn.terrain_error_px == plan.terrain_error_px
                 && drawn.models == models
                 && drawn.surface_reads == plan.surface_reads
+                && drawn.samples_a_pixel == plan.samples_a_pixel
         }) {
             return Ok(());
         }
@@ -69,6 +71,7 @@ impl Session<'_> {
             terrain_error_px: plan.terrain_error_px,
             models,
             surface_reads: plan.surface_reads,
+            samples_a_pixel: plan.samples_a_pixel,
             target: None,
             by_host,
             slot,
@@ -103,7 +106,7 @@ impl Session<'_> {
         let gpu = &self.engine.gpu;
         let size_px = IdealTarget::size_for(plan, gpu.max_side_px());
         // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
-        let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan.edges));
+        let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
         let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
             let fine = plan.edges != EdgeStage::None;
             let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
@@ -112,7 +115,7 @@ impl Session<'_> {
                 let longest_unused = self.targets.iter().position(alike).unwrap_or_default();
                 self.targets.remove(longest_unused);
             }
-            Target { ideal: IdealTarget::new(gpu, size_px, plan.edges, plan.preset), groups: Default::default() }
+            Target { ideal: IdealTarget::new(gpu, size_px, plan), groups: Default::default() }
         });
         self.targets.push(target);
         let target = self.targets.len() - 1;

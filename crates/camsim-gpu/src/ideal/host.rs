@@ -9,7 +9,7 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, SurfaceReads},
+    plan::FramePlan,
     pose::CameraPose,
     scene::{LevelTolerance, Light, Material, PlacedMesh, Scene, Terrain, Texture, Wrap, is_whole},
 };
@@ -27,18 +27,21 @@ use crate::{
 
 mod corners;
 mod cover;
+mod marks;
 mod models;
 mod picture;
 mod reads;
+mod samples;
 mod shade;
 #[cfg(test)]
 mod tests;
 mod triangles;
 
 use corners::{Camera, Corner};
-use cover::{BEYOND, Band, SKY};
+use cover::{BEYOND, Band, Pixels, Places, SKY};
 use models::{Piece, TRIANGLES_A_CHUNK};
 use picture::Picture;
+use samples::{ALONG, Sampled};
 use shade::{Paint, Planes, Shader};
 use triangles::{BAND_ROWS, Chunk, Kind};
 
@@ -63,6 +66,14 @@ pub(crate) struct DrawnFrame {
 }
 
 impl DrawnFrame {
+    /// Has so many pixels from now on.
+    fn fit(&mut self, size_px: [u32; 2]) {
+        let [width, height] = size_px.map(|side| side as usize);
+        self.stride = (width + BEYOND).next_multiple_of(LANES);
+        self.depth.fit(self.stride * height);
+        self.color.fit(CHANNELS * self.stride * height);
+    }
+
     /// Linear R G B A and near / z of a frame of this size, row-major.
     pub fn images(&self, [width, height]: [u32; 2]) -> (Vec<f32>, Vec<f32>) {
         let (width, height) = (width as usize, height as usize);
@@ -83,6 +94,8 @@ pub(crate) struct HostScene {
     terrain: Vec<Corner<2>>,
     /// Which triangle each pixel shows.
     shown: Large<u32>,
+    /// What frames of several samples a pixel need.
+    sampled: Sampled,
 }
 
 /// Meshes of one shape and material.
@@ -142,7 +155,7 @@ impl HostScene {
             light: batch.light,
         };
         let models = buffers.batches.iter().map(model).collect();
-        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Large::default() })
+        Some(Self { paints, models, chunks: Vec::new(), terrain: Vec::new(), shown: Large::default(), sampled: Sampled::default() })
     }
 
     /// Draws the one ideal frame of a plan.
@@ -154,23 +167,64 @@ impl HostScene {
             focal_px: ideal.focal_px.as_vec2().to_array(),
             principal_px: ideal.principal_px.as_vec2().to_array(),
             size_px: ideal.size_px,
+            beside: 0,
         };
-        let [width, height] = camera.size_px.map(|side| side as usize);
-        into.stride = (width + BEYOND).next_multiple_of(LANES);
-        into.depth.fit(into.stride * height);
-        into.color.fit(CHANNELS * into.stride * height);
-        self.shown.fit(into.stride * height);
         let (seen, drawn) = see_meshes(view.buffers, &key.pose, view.tolerance);
         let mut parts = terrain_parts(view.terrain);
         self.add_parts(&drawn, &mut parts);
         let jobs = jobs(parts);
-        self.project_terrain(&camera, view.terrain);
+        match view.plan.samples_a_pixel {
+            1 => self.draw_all(Pixels, &camera, &view, &key.pose, &seen, &jobs, into),
+            _ => self.draw_samples(&camera.of_samples(), &view, &key.pose, &seen, &jobs, into),
+        }
+    }
+
+    /// Draws so many chunks at once, each number of them over what is there.
+    fn draw_all<P: Places>(
+        &mut self,
+        places: P,
+        camera: &Camera,
+        view: &View<'_>,
+        pose: &CameraPose,
+        seen: &[u32],
+        jobs: &[Vec<Part>],
+        into: &mut DrawnFrame,
+    ) {
+        into.fit(camera.size_px);
+        self.shown.fit(into.depth.len());
+        self.project_terrain(camera, view.terrain);
         for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
             let first = round * CHUNKS_A_ROUND;
             let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
-            self.collect(&camera, &view, &key.pose, &seen, jobs);
-            self.fill(&camera, view.plan.surface_reads, jobs.len(), round > 0, into);
+            self.collect(camera, view, pose, seen, jobs);
+            self.fill(places, camera, view.plan, jobs.len(), round > 0, into);
         }
+    }
+
+    /// The same of several samples a pixel, as their camera sees them.
+    fn draw_samples(
+        &mut self,
+        camera: &Camera,
+        view: &View<'_>,
+        pose: &CameraPose,
+        seen: &[u32],
+        jobs: &[Vec<Part>],
+        into: &mut DrawnFrame,
+    ) {
+        into.fit(view.plan.ideal.size_px);
+        if jobs.len() > CHUNKS_A_ROUND {
+            // What samples show would have to be kept from one round to the next: each is drawn as a pixel.
+            let mut samples = DrawnFrame::default();
+            self.draw_all(cover::Samples, camera, view, pose, seen, jobs, &mut samples);
+            return samples::mix(&samples, view.plan.ideal.size_px, into);
+        }
+        self.shown.fit(into.depth.len());
+        self.project_terrain(camera, view.terrain);
+        self.collect(camera, view, pose, seen, jobs);
+        let chunks = &self.chunks[..jobs.len()];
+        let shader =
+            Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
+        self.sampled.fill(&shader, &mut self.shown, into);
     }
 
     fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(Part, usize)>) {
@@ -209,6 +263,7 @@ impl HostScene {
         }
         jobs.par_iter().zip(&mut *chunks).for_each(|(job, chunk)| {
             chunk.clear();
+            chunk.is_of_ground = matches!(job.first(), Some(Part::Terrain(_)));
             self.triangles_of(camera, view, pose, seen, job, chunk);
             chunk.sort(bands);
         });
@@ -247,9 +302,10 @@ impl HostScene {
     }
 
     /// Depth and colour of every pixel; with `is_over` of those that show something nearer than what is there.
-    fn fill(&mut self, camera: &Camera, reads: SurfaceReads, chunks: usize, is_over: bool, into: &mut DrawnFrame) {
-        let stride = into.stride;
-        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, is_over };
+    fn fill<P: Places>(&mut self, places: P, camera: &Camera, plan: &FramePlan, chunks: usize, is_over: bool, into: &mut DrawnFrame) {
+        let (stride, reads) = (into.stride, plan.surface_reads);
+        let a_pixel = camera.size_px[0] as f32 / plan.ideal.size_px[0] as f32;
+        let shader = Shader { camera, chunks: &self.chunks[..chunks], paints: &self.paints, reads, a_pixel, is_over };
         let of_band = stride * BAND_ROWS;
         let bands =
             into.depth.par_chunks_mut(of_band).zip(into.color.par_chunks_mut(CHANNELS * of_band)).zip(self.shown.par_chunks_mut(of_band));
@@ -258,25 +314,24 @@ impl HostScene {
                 depth.fill(0.0);
             }
             shown.fill(SKY);
-            let band = Band { first_row: band * BAND_ROWS, stride, depth, shown };
-            widest!(vectors => fill_band(vectors, &shader, band, color))
+            let band = Band { number: band, stride, depth, shown };
+            widest!(vectors => fill_band(vectors, places, &shader, band, color))
         });
     }
 }
 
 #[inline(always)]
-fn fill_band(vectors: impl Vectors, shader: &Shader<'_>, mut band: Band<'_>, color: &mut [u16]) {
+fn fill_band(vectors: impl Vectors, places: impl Places, shader: &Shader<'_>, mut band: Band<'_>, color: &mut [u16]) {
     for (number, chunk) in (0..).zip(shader.chunks) {
-        band.draw(chunk, number);
+        band.draw(places, chunk, number, |_| true);
     }
     let width = shader.camera.size_px[0] as usize;
-    let rows =
-        band.depth.chunks_exact(band.stride).zip(band.shown.chunks_exact(band.stride)).zip(color.chunks_exact_mut(CHANNELS * band.stride));
+    let rows = band.shown.chunks_exact(band.stride).zip(color.chunks_exact_mut(CHANNELS * band.stride));
     let mut planes = Planes::new();
-    for (row, ((depth, shown), color)) in rows.enumerate() {
-        let blocks = depth.as_chunks().0.iter().zip(shown.as_chunks().0).zip(color.chunks_exact_mut(CHANNELS * LANES));
-        for (number, ((depth, shown), color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
-            shader.block(vectors, [number * LANES, band.first_row + row], depth, shown, &mut planes, color);
+    for (row, (shown, color)) in rows.enumerate() {
+        let blocks = shown.as_chunks().0.iter().zip(color.chunks_exact_mut(CHANNELS * LANES));
+        for (number, (shown, color)) in blocks.take(width.div_ceil(LANES)).enumerate() {
+            shader.block(vectors, [number * LANES, band.number * BAND_ROWS + row], shown, &mut planes, color);
         }
     }
 }
@@ -288,12 +343,14 @@ fn terrain_parts(terrain: Option<&PlacedMesh>) -> Vec<(Part, usize)> {
     (0..count).step_by(step).map(|first| first..(first + step).min(count)).map(|of| (Part::Terrain(of.clone()), of.len() / 3)).collect()
 }
 
-/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many different models there are.
+/// Parts of chunks, in their order: [`TRIANGLES_A_CHUNK`] together at most, and few chunks however many different models there are; of the terrain or of models.
 fn jobs(parts: Vec<(Part, usize)>) -> Vec<Vec<Part>> {
     let mut jobs: Vec<Vec<Part>> = Vec::new();
     let mut room = 0;
     for (part, triangles) in parts {
-        match jobs.last_mut().filter(|_| triangles <= room) {
+        let is_terrain = |part: &Part| matches!(part, Part::Terrain(_));
+        let is_alike = |job: &[Part]| job.first().is_some_and(|first| is_terrain(first) == is_terrain(&part));
+        match jobs.last_mut().filter(|job| triangles <= room && is_alike(job)) {
             Some(job) => job.push(part),
             None => {
                 jobs.push(vec![part]);

@@ -3,6 +3,7 @@
 use camsim_core::{
     plan::MAX_KEYS,
     scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
+    temporal::SAMPLES,
 };
 
 /// A table of keys with what belongs to it.
@@ -164,6 +165,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.blur_samples", CountOr(MAX_BLUR_SAMPLES, AUTO)),
     ("quality.footprint_taps", CountOr(MAX_FOOTPRINT_TAPS, AUTO)),
     ("quality.ideal_scale", NumberOr(AUTO)),
+    ("quality.ideal_samples", CountOr(SAMPLES, AUTO)),
     ("quality.key_frames", CountOr(MAX_KEYS, AUTO)),
     ("quality.frames_per_ideal", Within(1, MAX_FRAMES_PER_IDEAL)),
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),

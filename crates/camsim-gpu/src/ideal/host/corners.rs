@@ -17,6 +17,8 @@ pub(super) struct Camera {
     pub focal_px: [f32; 2],
     pub principal_px: [f32; 2],
     pub size_px: [u32; 2],
+    /// How far beside the middles of pixels it is asked what they show, 1/[`SUBPIXELS`] px.
+    pub beside: i32,
 }
 
 /// A corner, or a place on a border that has been cut.
@@ -35,6 +37,17 @@ pub(super) struct Corner<const N: usize> {
 }
 
 impl Camera {
+    /// The same with two by two pixels for each, one for each of its samples.
+    pub fn of_samples(&self) -> Self {
+        Self {
+            focal_px: self.focal_px.map(|px| 2.0 * px),
+            principal_px: self.principal_px.map(|px| 2.0 * px + 0.5),
+            size_px: self.size_px.map(|side| 2 * side),
+            beside: SUBPIXELS / 2,
+            ..*self
+        }
+    }
+
     /// Projects a corner.
     #[inline(always)]
     pub fn corner<const N: usize>(&self, in_camera_m: [f32; 3], on_it: [f32; N]) -> Corner<N> {

@@ -1,5 +1,7 @@
 //! Which triangle each pixel shows, and how far it is.
 
+use std::ops::RangeInclusive;
+
 use super::{
     corners::SUBPIXELS,
     triangles::{BAND_ROWS, Chunk, Cover},
@@ -18,7 +20,8 @@ pub(super) const CHUNK_BITS: u32 = 16;
 
 /// Depths and triangles of a band of rows.
 pub(super) struct Band<'a> {
-    pub first_row: usize,
+    /// Of as many rows of the grid that triangles are on as [`BAND_ROWS`].
+    pub number: usize,
     /// Numbers from one row to the next.
     pub stride: usize,
     /// near / z; 0 is infinitely far.
@@ -27,7 +30,61 @@ pub(super) struct Band<'a> {
     pub shown: &'a mut [u32],
 }
 
-/// `a x + b y + c`, at least 0 within a triangle.
+/// Where it is asked which triangle is shown.
+pub(super) trait Places: Copy + Send + Sync {
+    /// Pixels that triangles are on, from one place to the next.
+    const STEP: usize;
+    /// Columns after which places are as high again.
+    const ALIKE: usize;
+
+    /// Quarters of a pixel from a pixel's middle to the right, by the row, and down, by the column; of pixels that are further apart, from the first one's.
+    fn beside(column: usize, row: usize) -> [i32; 2];
+}
+
+/// At the middles of the pixels that triangles are on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pixels;
+
+/// In the middle of each two by two of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fours;
+
+/// A quarter beside the middle of each: to the right in even rows and to the left in odd ones, up in even columns and down in odd ones, so that two by two of them are the places of a
+/// device's four samples a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Samples;
+
+impl Places for Pixels {
+    const STEP: usize = 1;
+    const ALIKE: usize = 1;
+
+    #[inline(always)]
+    fn beside(_: usize, _: usize) -> [i32; 2] {
+        [0; 2]
+    }
+}
+
+impl Places for Fours {
+    const STEP: usize = 2;
+    const ALIKE: usize = 1;
+
+    #[inline(always)]
+    fn beside(_: usize, _: usize) -> [i32; 2] {
+        [2; 2]
+    }
+}
+
+impl Places for Samples {
+    const STEP: usize = 1;
+    const ALIKE: usize = 2;
+
+    #[inline(always)]
+    fn beside(column: usize, row: usize) -> [i32; 2] {
+        [1 - 2 * (row as i32 & 1), 2 * (column as i32 & 1) - 1]
+    }
+}
+
+/// `a x + b y + c` of places in quarters of a pixel, at least 0 within a triangle.
 #[derive(Clone, Copy)]
 struct Side<T> {
     across: T,
@@ -35,63 +92,93 @@ struct Side<T> {
     from: T,
 }
 
-/// A side from a corner to the next, by pixels from the triangle's first; what is exactly on it is within if it is an upper or a left one.
+/// A side from a corner to the next, by quarters from the triangle's first pixel; what is exactly on it is within if it is an upper or a left one.
 #[inline(always)]
 fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output = T>>(a: [i32; 2], b: [i32; 2]) -> Side<T> {
     let [dx, dy] = [b[0] - a[0], b[1] - a[1]];
     let is_kept = dy < 0 || (dy == 0 && dx > 0);
     let t = T::from;
     let from = t(dy) * t(a[0]) - t(dx) * t(a[1]) - t(i32::from(!is_kept));
-    Side { across: t(0) - t(dy) * t(SUBPIXELS), down: t(dx) * t(SUBPIXELS), from }
+    Side { across: t(0) - t(dy) * t(SUBPIXELS / 4), down: t(dx) * t(SUBPIXELS / 4), from }
+}
+
+/// Where a triangle is in a band.
+struct Within {
+    rows: RangeInclusive<usize>,
+    /// First and last columns.
+    columns: [usize; 2],
+    /// Quarters of a pixel from the triangle's first one to the first column.
+    right: i32,
 }
 
 impl Band<'_> {
-    /// Draws a chunk's triangles.
+    /// Draws a chunk's triangles that are wanted.
     #[inline(always)]
-    pub fn draw(&mut self, chunk: &Chunk, number: u32) {
-        for &triangle in chunk.of_band(self.first_row / BAND_ROWS) {
+    pub fn draw<P: Places>(&mut self, _: P, chunk: &Chunk, number: u32, mut is_wanted: impl FnMut(&Cover) -> bool) {
+        for &triangle in chunk.of_band(self.number) {
             let cover = &chunk.covers[triangle as usize];
+            if !is_wanted(cover) {
+                continue;
+            }
             let name = number << CHUNK_BITS | triangle;
             match chunk.large.get(cover.large as usize) {
-                None => self.small(cover, name),
-                Some([inverse, ..]) => self.large(cover, inverse, name),
+                None => self.small::<P>(cover, name),
+                Some([inverse, ..]) => (0..P::ALIKE).for_each(|first| self.large::<P>(cover, inverse, name, first)),
             }
         }
     }
 
-    fn rows(&self, cover: &Cover) -> std::ops::RangeInclusive<usize> {
-        let last = self.first_row + BAND_ROWS - 1;
-        usize::from(cover.first[1]).max(self.first_row)..=usize::from(cover.last[1]).min(last)
+    fn first_row<P: Places>(&self) -> usize {
+        self.number * (BAND_ROWS / P::STEP)
     }
 
     #[inline(always)]
-    fn small(&mut self, cover: &Cover, name: u32) {
+    fn within<P: Places>(&self, cover: &Cover) -> Within {
+        let [first, last] = [cover.first, cover.last].map(|of| of.map(|of| usize::from(of) / P::STEP));
+        let first_row = self.first_row::<P>();
+        let right = 4 * ((P::STEP * first[0]) as i32 - i32::from(cover.first[0]));
+        Within { rows: first[1].max(first_row)..=last[1].min(first_row + BAND_ROWS / P::STEP - 1), columns: [first[0], last[0]], right }
+    }
+
+    #[inline(always)]
+    fn small<P: Places>(&mut self, cover: &Cover, name: u32) {
         let [a, b, c] = cover.at;
         let sides: [Side<i32>; 3] = [side(a, b), side(b, c), side(c, a)];
-        let last = i32::from(cover.last[0] - cover.first[0]);
+        let Within { rows, columns: [first, last], right } = self.within::<P>(cover);
+        let last = (last - first) as i32;
+        let step = 4 * P::STEP as i32;
+        let inverse = [cover.inverse[0], 0.25 * cover.inverse[1], 0.25 * cover.inverse[2]];
         // What each of the pixels side by side adds.
         let (mut adds, mut adds_inverse) = ([[0; SIDE_BY_SIDE]; 3], [0.0; SIDE_BY_SIDE]);
         for i in 0..SIDE_BY_SIDE {
-            adds_inverse[i] = cover.inverse[1] * i as f32;
+            let [_, down] = P::beside(first + i, 0);
+            adds_inverse[i] = inverse[1] * (step * i as i32) as f32 + inverse[2] * down as f32;
             for k in 0..3 {
-                adds[k][i] = sides[k].across * i as i32;
+                adds[k][i] = sides[k].across * (step * i as i32) + sides[k].down * down;
             }
         }
-        for y in self.rows(cover) {
-            let down = (y - usize::from(cover.first[1])) as i32;
-            let begins = [sides[0].from + sides[0].down * down, sides[1].from + sides[1].down * down, sides[2].from + sides[2].down * down];
-            let begin_inverse = cover.inverse[2].mul_add(down as f32, cover.inverse[0]);
-            let row = (y - self.first_row) * self.stride + usize::from(cover.first[0]);
+        let first_row = self.first_row::<P>();
+        for y in rows {
+            let [beside, _] = P::beside(0, y);
+            let right = right + beside;
+            let down = 4 * ((P::STEP * y) as i32 - i32::from(cover.first[1]));
+            let mut begins = [0; 3];
+            for k in 0..3 {
+                begins[k] = sides[k].from + sides[k].down * down + sides[k].across * right;
+            }
+            let begin_inverse = inverse[2].mul_add(down as f32, inverse[1].mul_add(right as f32, inverse[0]));
+            let row = (y - first_row) * self.stride + first;
             for x in (0..=last).step_by(SIDE_BY_SIDE) {
-                let from = [begins[0] + sides[0].across * x, begins[1] + sides[1].across * x, begins[2] + sides[2].across * x];
-                let inverse = cover.inverse[1].mul_add(x as f32, begin_inverse);
+                let far = step * x;
+                let from = [begins[0] + sides[0].across * far, begins[1] + sides[1].across * far, begins[2] + sides[2].across * far];
+                let from_inverse = inverse[1].mul_add(far as f32, begin_inverse);
                 let place = row + x as usize;
                 // Rows have more numbers than pixels, so that there are enough.
                 let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else { return };
                 for i in 0..SIDE_BY_SIDE {
                     // Bits of what is less than 0 anywhere.
                     let beyond = (from[0] + adds[0][i]) | (from[1] + adds[1][i]) | (from[2] + adds[2][i]) | (last - x - i as i32);
-                    let here = inverse + adds_inverse[i];
+                    let here = from_inverse + adds_inverse[i];
                     let is_seen = (beyond >= 0) & (here > depth[i]);
                     depth[i] = if is_seen { here } else { depth[i] };
                     shown[i] = if is_seen { name } else { shown[i] };
@@ -100,31 +187,39 @@ impl Band<'_> {
         }
     }
 
-    /// By spans, whose ends are exact in 64 bits.
-    fn large(&mut self, cover: &Cover, inverse: &[f64; 3], name: u32) {
+    /// By spans, whose ends are exact in 64 bits: of columns that are alike, from the triangle's first one or one beside it on.
+    fn large<P: Places>(&mut self, cover: &Cover, inverse: &[f64; 3], name: u32, begin: usize) {
         let [a, b, c] = cover.at;
         let sides: [Side<i64>; 3] = [side(a, b), side(b, c), side(c, a)];
-        for y in self.rows(cover) {
-            let down = (y - usize::from(cover.first[1])) as i64;
-            let (mut first, mut last) = (0, i64::from(cover.last[0] - cover.first[0]));
+        let Within { rows, columns: [first_column, last_column], right } = self.within::<P>(cover);
+        let step = 4 * P::STEP as i64;
+        let inverse = [inverse[0], 0.25 * inverse[1], 0.25 * inverse[2]];
+        let first_row = self.first_row::<P>();
+        for y in rows {
+            let beside = P::beside(first_column + begin, y);
+            let right = i64::from(right + beside[0]);
+            let down = i64::from(4 * ((P::STEP * y) as i32 - i32::from(cover.first[1])) + beside[1]);
+            let (mut first, mut last) = (0, (last_column - first_column) as i64);
             for side in &sides {
-                let from = side.from + side.down * down;
-                match side.across {
+                let from = side.from + side.down * down + side.across * right;
+                match step * side.across {
                     0 if from < 0 => last = -1,
                     0 => {}
                     across @ 1.. => first = first.max((-from).div_euclid(across) + i64::from((-from).rem_euclid(across) != 0)),
                     across => last = last.min(from.div_euclid(-across)),
                 }
             }
+            first += (begin as i64 - first).rem_euclid(P::ALIKE as i64);
             if first > last {
                 continue;
             }
-            let begin = inverse[0] + inverse[2] * down as f64 + inverse[1] * first as f64;
-            let row = (y - self.first_row) * self.stride + usize::from(cover.first[0]);
+            let across = step as f64 * inverse[1];
+            let at_first = inverse[0] + inverse[2] * down as f64 + inverse[1] * right as f64 + across * first as f64;
+            let row = (y - first_row) * self.stride + first_column;
             let span = row + first as usize..row + last as usize + 1;
             let pixels = self.depth[span.clone()].iter_mut().zip(&mut self.shown[span]);
-            for (i, (depth, shown)) in (0_i32..).zip(pixels) {
-                let here = (begin + inverse[1] * f64::from(i)) as f32;
+            for (i, (depth, shown)) in (0_i32..).zip(pixels).step_by(P::ALIKE) {
+                let here = (at_first + across * f64::from(i)) as f32;
                 let is_seen = here > *depth;
                 *depth = if is_seen { here } else { *depth };
                 *shown = if is_seen { name } else { *shown };

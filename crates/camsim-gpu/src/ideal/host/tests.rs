@@ -6,7 +6,7 @@ use camsim_core::noise::pcg4d;
 
 use super::{
     corners::{Camera, Corner, SUBPIXELS},
-    cover::{BEYOND, Band, SKY, SMALL_PX},
+    cover::{BEYOND, Band, Fours, Pixels, Places, SKY, SMALL_PX, Samples},
     triangles::{BAND_ROWS, Chunk, Kind},
 };
 use crate::layout::IdealCamera;
@@ -26,7 +26,7 @@ fn camera_at(principal_px: [f32; 2]) -> Camera {
         near_m: 0.05,
         ..IdealCamera::default()
     };
-    Camera { uniforms, focal_px: [100.0, 100.0], principal_px, size_px: SIZE_PX }
+    Camera { uniforms, focal_px: [100.0, 100.0], principal_px, size_px: SIZE_PX, beside: 0 }
 }
 
 fn random(k: u32) -> [f32; 4] {
@@ -35,22 +35,24 @@ fn random(k: u32) -> [f32; 4] {
 
 /// How often each pixel is covered by triangles that do not hide each other, and what they are drawn as.
 fn covered(triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
-    covered_by(&camera(), triangles, kind)
+    covered_by(Pixels, &camera(), triangles, kind)
 }
 
-fn covered_by(camera: &Camera, triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
-    let [width, height] = SIZE_PX.map(|side| side as usize);
-    let stride = width + BEYOND;
+/// The same at other places.
+fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]], kind: Kind) -> (Vec<u32>, [usize; 2]) {
+    let [width, height] = SIZE_PX.map(|side| side as usize / P::STEP);
+    let (stride, rows) = (width + BEYOND, BAND_ROWS / P::STEP);
     let mut counts = vec![0; width * height];
     let (mut chunk, mut kinds) = (Chunk::default(), [0; 2]);
     for [a, b, c] in triangles {
         chunk.clear();
         chunk.add(camera, [a, b, c], kind);
-        chunk.sort(height.div_ceil(BAND_ROWS));
+        chunk.sort(height.div_ceil(rows));
         kinds = [kinds[0] + chunk.covers.len() - chunk.large.len(), kinds[1] + chunk.large.len()];
-        for first_row in (0..height).step_by(BAND_ROWS).filter(|row| !chunk.of_band(row / BAND_ROWS).is_empty()) {
-            let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
-            Band { first_row, stride, depth: &mut depth, shown: &mut shown }.draw(&chunk, 0);
+        for number in (0..height.div_ceil(rows)).filter(|&number| !chunk.of_band(number).is_empty()) {
+            let first_row = number * rows;
+            let (mut depth, mut shown) = (vec![0.0; stride * rows], vec![SKY; stride * rows]);
+            Band { number, stride, depth: &mut depth, shown: &mut shown }.draw(places, &chunk, 0, |_| true);
             for (row, shown) in shown.chunks_exact(stride).enumerate() {
                 assert!(shown[width..].iter().all(|&shown| shown == SKY), "nothing beyond the picture");
                 let is_row = first_row + row < height;
@@ -83,28 +85,33 @@ fn sheet_by(camera: &Camera, cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -
     (0..cells * cells).flat_map(|k| pair(k % cells, k / cells)).collect()
 }
 
-#[test]
-fn pixels_are_covered_once() {
-    // From 0.3 to 400 px a cell; past all borders, so that corners far beyond them are cut; and steep towards the camera, so that some are behind it.
+/// From 0.3 to 400 px a cell, and past all borders, so that corners far beyond them are cut; whether there are small triangles, and large ones.
+fn walls() -> [(&'static str, Vec<[Corner<2>; 3]>, [bool; 2]); 6] {
     let wall = |side_m: f32| move |[x, y]: [f32; 2]| [side_m * (x - 0.5), side_m * (y - 0.5), 10.0];
-    let floor = |[x, y]: [f32; 2]| [400.0 * (x - 0.5), 2.0, 400.0 * (y - 0.5)];
-    for (name, triangles, has) in [
+    [
         ("small", sheet(60, wall(22.0)), [true, false]),
         ("tiny", sheet(400, wall(21.0)), [true, false]),
         ("middle", sheet(7, wall(40.0)), [true, true]),
         ("large", sheet(2, wall(60.0)), [false, true]),
         ("beyond all borders", sheet(3, wall(90_000.0)), [false, true]),
         ("many beyond all borders", sheet(40, wall(40_000.0)), [false, true]),
-    ] {
+    ]
+}
+
+fn assert_covered_once(name: &str, counts: &[u32]) {
+    let other = counts.iter().filter(|&&count| count != 1).count();
+    assert_eq!(other, 0, "{name}: of {} places", counts.len());
+}
+
+#[test]
+fn pixels_are_covered_once() {
+    for (name, triangles, has) in walls() {
         let (counts, [small, large]) = covered(&triangles, KIND);
-        assert!(
-            counts.iter().all(|&count| count == 1),
-            "{name}: {} of {} pixels",
-            counts.iter().filter(|&&count| count != 1).count(),
-            counts.len()
-        );
+        assert_covered_once(name, &counts);
         assert_eq!([small > 0, large > 0], has, "{name}: {small} small, {large} large");
     }
+    // Steep towards the camera, so that some are behind it.
+    let floor = |[x, y]: [f32; 2]| [400.0 * (x - 0.5), 2.0, 400.0 * (y - 0.5)];
     let (counts, _) = covered(&sheet(9, floor), KIND);
     let (above, below) = counts.split_at(74 * SIZE_PX[0] as usize);
     assert!(above.iter().all(|&count| count == 0), "nothing above the horizon");
@@ -113,12 +120,21 @@ fn pixels_are_covered_once() {
 }
 
 #[test]
+fn samples_and_middles_of_fours_are_covered_once() {
+    let camera = Camera { beside: SUBPIXELS / 2, ..camera() };
+    for (name, triangles, _) in walls() {
+        assert_covered_once(name, &covered_by(Samples, &camera, &triangles, KIND).0);
+        assert_covered_once(name, &covered_by(Fours, &camera, &triangles, KIND).0);
+    }
+}
+
+#[test]
 fn pictures_far_beside_the_axis_are_covered_once() {
     for principal_px in [[17_000.0, 74.5], [-20_000.0, 74.5], [99.5, 31_000.0], [-40_000.0, -40_000.0]] {
         let camera = camera_at(principal_px);
         for (cells, side_m) in [(2, 30_000.0), (30, 20_000.0)] {
             let wall = |[x, y]: [f32; 2]| [side_m * (x - 0.5), side_m * (y - 0.5), 10.0];
-            let (counts, _) = covered_by(&camera, &sheet_by(&camera, cells, wall), KIND);
+            let (counts, _) = covered_by(Pixels, &camera, &sheet_by(&camera, cells, wall), KIND);
             let other = counts.iter().filter(|&&count| count != 1).count();
             assert_eq!(other, 0, "{principal_px:?}, {cells} cells: of {} pixels", counts.len());
         }
@@ -137,19 +153,18 @@ fn one_side_is_there_from_where_it_turns_anticlockwise() {
     assert_eq!([count([a, b, c], true), count([a, c, b], true), count([a, c, b], false)], [both, 0, both]);
 }
 
-#[test]
-fn small_triangles_cover_what_64_bits_say() {
-    let camera = camera();
-    let mut pixels = 0;
+/// Triangles that reach so far cover the places that products in 64 bits say; how many.
+fn covered_exactly<P: Places>(places: P, beside: i32, reach_m: f32) -> u32 {
+    let camera = Camera { beside, ..camera() };
+    let mut all = 0;
     for k in 0..400 {
         let corner = |n: u32| {
             let [x, y, z, _] = random(7 * k + n);
-            camera.corner([4.0 * (x - 0.5), 4.0 * (y - 0.5), 10.0 + 4.0 * z], [x, y])
+            camera.corner([reach_m * (x - 0.5), reach_m * (y - 0.5), 10.0 + 4.0 * z], [x, y])
         };
         let triangle = [corner(0), corner(1), corner(2)];
-        let (counts, [small, large]) = covered(&[triangle], KIND);
-        assert_eq!((small <= 1, large), (true, 0));
-        // On the grid, in 64 bits.
+        let (counts, _) = covered_by(places, &camera, &[triangle], KIND);
+        // On the grid.
         let inside = |x: i64, y: i64| {
             let side = |a: usize, b: usize| {
                 let ([ax, ay], [bx, by]) = (triangle[a].at.map(i64::from), triangle[b].at.map(i64::from));
@@ -158,14 +173,28 @@ fn small_triangles_cover_what_64_bits_say() {
             let sides = [side(0, 1), side(1, 2), side(2, 0)];
             (sides.iter().all(|&side| side > 0) || sides.iter().all(|&side| side < 0), sides.contains(&0))
         };
+        let columns = SIZE_PX[0] as usize / P::STEP;
         for (i, &count) in counts.iter().enumerate() {
-            let [x, y] = [i as i64 % i64::from(SIZE_PX[0]), i as i64 / i64::from(SIZE_PX[0])].map(|px| px * i64::from(SUBPIXELS));
-            let (is_inside, is_on_border) = inside(x, y);
-            assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, pixel {i}");
-            pixels += count;
+            let [column, row] = [i % columns, i / columns];
+            let [right, down] = P::beside(column, row);
+            let at = |place: usize, quarters: i32| (P::STEP * place) as i64 * i64::from(SUBPIXELS) + i64::from(quarters * SUBPIXELS / 4);
+            let (is_inside, is_on_border) = inside(at(column, right), at(row, down));
+            assert!(is_on_border || (count == 1) == is_inside, "triangle {k}, place {i}");
+            all += count;
         }
     }
-    assert!(pixels > 10_000, "{pixels}");
+    all
+}
+
+#[test]
+fn triangles_cover_what_64_bits_say() {
+    // The latter are large ones mostly.
+    for reach_m in [4.0, 25.0] {
+        let pixels = covered_exactly(Pixels, 0, reach_m);
+        let samples = covered_exactly(Samples, SUBPIXELS / 2, reach_m);
+        let fours = covered_exactly(Fours, SUBPIXELS / 2, reach_m);
+        assert!(pixels > 10_000 && pixels.abs_diff(samples) < pixels / 20 && pixels.abs_diff(4 * fours) < pixels / 20, "{pixels} {samples} {fours}");
+    }
 }
 
 #[test]
@@ -191,9 +220,9 @@ fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
         let (nearest, farthest) = (0.05 / 10.0, 0.05 / 14.0);
         // A pixel is at most a step of the grid beyond where the corners are, of eight that the triangle is wide at least.
         let allowed = 0.25 * (nearest - farthest);
-        for first_row in (0..height).step_by(BAND_ROWS) {
+        for number in 0..height.div_ceil(BAND_ROWS) {
             let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
-            Band { first_row, stride, depth: &mut depth, shown: &mut shown }.draw(&chunk, 0);
+            Band { number, stride, depth: &mut depth, shown: &mut shown }.draw(Pixels, &chunk, 0, |_| true);
             for inverse in depth.into_iter().zip(shown).filter(|&(_, shown)| shown != SKY).map(|(inverse, _)| inverse) {
                 pixels += 1;
                 assert!((farthest - allowed..=nearest + allowed).contains(&inverse), "{k}: {inverse}");
@@ -223,8 +252,8 @@ fn numbers_that_are_none_draw_nothing() {
 
 #[test]
 fn products_of_small_triangles_fit_32_bits() {
-    // The largest number of `small`: three sums of products of differences of corners with places up to the last pixel side by side.
+    // The largest number of `small`: three sums of products of differences of corners with places up to the last one side by side, which may be two pixels apart.
     let corner = i64::from(SMALL_PX * SUBPIXELS);
-    let farthest = i64::from((2 * SMALL_PX + BEYOND as i32) * SUBPIXELS) - corner;
+    let farthest = corner + i64::from((2 * (BEYOND as i32 - 1) + 1) * SUBPIXELS);
     assert!(2 * (2 * corner) * (farthest + corner) <= i64::from(i32::MAX), "{}", 2 * (2 * corner) * (farthest + corner));
 }

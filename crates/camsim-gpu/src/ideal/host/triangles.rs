@@ -76,6 +76,8 @@ impl Kind {
 /// Triangles that are worked out together, in the order in which they are drawn.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
+    /// Whether they are the terrain's, and not models'.
+    pub is_of_ground: bool,
     pub covers: Vec<Cover>,
     pub surfaces: Vec<Surface>,
     /// Planes of large ones once more, near / z and texture coordinates: towards a horizon little is left of what they have at the other end.
@@ -156,10 +158,10 @@ impl Chunk {
         let [ax, ay, bx, by, cx, cy] = [a.at[0], a.at[1], b.at[0], b.at[1], c.at[0], c.at[1]];
         let (left, right) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
         let (top, bottom) = (ay.min(by).min(cy), ay.max(by).max(cy));
-        // Pixels whose middles are within the box.
-        let first = [((left + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0), ((top + SUBPIXELS - 1) >> SUBPIXEL_BITS).max(0)];
-        let last =
-            [(right >> SUBPIXEL_BITS).min(camera.size_px[0] as i32 - 1), (bottom >> SUBPIXEL_BITS).min(camera.size_px[1] as i32 - 1)];
+        // Pixels that are asked within the box.
+        let beside = camera.beside;
+        let first = [left, top].map(|least| ((least + SUBPIXELS - 1 - beside) >> SUBPIXEL_BITS).max(0));
+        let last = [(right, 0), (bottom, 1)].map(|(most, k)| ((most + beside) >> SUBPIXEL_BITS).min(camera.size_px[k] as i32 - 1));
         if first[0] > last[0] || first[1] > last[1] {
             return;
         }
