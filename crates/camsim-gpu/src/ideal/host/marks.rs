@@ -1,13 +1,18 @@
 //! Which parts of an ideal frame are drawn with several samples a pixel: tiles with a step of depth between their pixels or beside them, and those with any triangle of a model, which
 //! may be thinner than a pixel. Everywhere else samples would show what the pixel's middle shows.
 
+use std::ops::RangeInclusive;
+
 use rayon::prelude::*;
 
 use super::{
     samples::{ALONG, PIXEL_ROWS},
     triangles::Cover,
 };
-use crate::host::lanes::{LANES, higher};
+use crate::host::{
+    lanes::{LANES, higher},
+    vectors::widest,
+};
 
 /// Side of a tile, pixels.
 pub(super) const TILE_PX: usize = 8;
@@ -56,30 +61,45 @@ impl Marks {
 
     /// Adds tiles in which depth has a step.
     pub fn add_steps(&mut self, depth: &[f32], stride: usize) {
-        let [width, height] = self.size_px;
-        let of = |tile_row: usize, marks: &mut [u64]| {
-            let mut steps = vec![0_u32; width.div_ceil(LANES)];
+        let height = self.size_px[1];
+        let rows = self.bits.par_chunks_mut(self.words).take(height.div_ceil(TILE_PX)).enumerate();
+        rows.for_each(|(tile_row, marks)| {
             // What is beside a step may show it too.
-            let first = (TILE_PX * tile_row).saturating_sub(1);
-            for y in first..(TILE_PX * (tile_row + 1) + 1).min(height) {
-                let row = |y: usize| &depth[y * stride..][..width];
-                add_steps_of_row([row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))], &mut steps);
-            }
-            for tile in 0..width.div_ceil(TILE_PX) {
-                if (0..TILE_PX + 2).any(|k| {
-                    // From the pixel before the tile to the one after it.
-                    let x = (TILE_PX * tile + k).wrapping_sub(1);
-                    steps.get(x / LANES).is_some_and(|steps| steps >> (x % LANES) & 1 == 1)
-                }) {
-                    marks[tile / BITS] |= 1 << (tile % BITS);
-                }
-            }
-        };
-        self.bits.par_chunks_mut(self.words).enumerate().filter(|(row, _)| row * TILE_PX < height).for_each(|(row, marks)| of(row, marks));
+            let (first, last) = ((TILE_PX * tile_row).saturating_sub(1), (TILE_PX * (tile_row + 1)).min(height - 1));
+            add_tiles(&steps_of_rows(first..=last, depth, stride, self.size_px), marks);
+        });
+    }
+}
+
+/// Bits of pixels in rows, any of which have a step.
+fn steps_of_rows(rows: RangeInclusive<usize>, depth: &[f32], stride: usize, [width, height]: [usize; 2]) -> Vec<u32> {
+    let row = |y: usize| &depth[y * stride..][..width];
+    let mut steps = vec![0; width.div_ceil(LANES)];
+    widest!(_vectors => {
+        for y in rows {
+            add_steps_of_row([row(y.saturating_sub(1)), row(y), row((y + 1).min(height - 1))], &mut steps);
+        }
+        steps
+    })
+}
+
+/// Marks tiles that have one of these pixels, or are beside one.
+fn add_tiles(pixels: &[u32], marks: &mut [u64]) {
+    const { assert!(LANES == u32::BITS as usize && LANES.is_multiple_of(TILE_PX)) };
+    let of = |block: Option<usize>| block.and_then(|block| pixels.get(block)).copied().unwrap_or(0);
+    for (block, &here) in pixels.iter().enumerate() {
+        let (before, after) = (of(block.checked_sub(1)), of(Some(block + 1)));
+        let beside = here | here << 1 | here >> 1 | before >> (LANES - 1) | after << (LANES - 1);
+        for tile in 0..LANES / TILE_PX {
+            let is_marked = beside >> (tile * TILE_PX) & ((1 << TILE_PX) - 1) != 0;
+            let column = block * (LANES / TILE_PX) + tile;
+            marks[column / BITS] |= u64::from(is_marked) << (column % BITS);
+        }
     }
 }
 
 /// Bits of pixels at which inverse depth bends, by three rows.
+#[inline(always)]
 fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
     let width = here.len();
     for (block, steps) in steps.iter_mut().enumerate() {
@@ -147,5 +167,62 @@ impl OfBand<'_> {
     #[inline(always)]
     pub fn is_marked_at(&self, column: usize, row: usize) -> bool {
         self.bits[row * self.words + column / BITS] >> (column % BITS) & 1 == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use camsim_core::noise::pcg4d;
+
+    use super::*;
+    use crate::host::large::Large;
+
+    /// Pixels with a step beside them, as they are by the definition.
+    fn marked(depth: &[f32], stride: usize, [width, height]: [usize; 2]) -> Vec<[usize; 2]> {
+        let at = |x: isize, y: isize| depth[y.clamp(0, height as isize - 1) as usize * stride + x.clamp(0, width as isize - 1) as usize];
+        let bends = |a: f32, b: f32, c: f32| (a - 2.0 * b + c).abs() > STEP * a.max(b).max(c);
+        let is_step = |x: isize, y: isize| {
+            let within = (0..width as isize).contains(&x) && (0..height as isize).contains(&y);
+            within && (bends(at(x - 1, y), at(x, y), at(x + 1, y)) || bends(at(x, y - 1), at(x, y), at(x, y + 1)))
+        };
+        let mut tiles: Vec<[usize; 2]> = Vec::new();
+        for (x, y) in (0..height as isize).flat_map(|y| (0..width as isize).map(move |x| (x, y))) {
+            if (-1..=1).any(|dy| (-1..=1).any(|dx| is_step(x + dx, y + dy))) {
+                tiles.push([x as usize / TILE_PX, y as usize / TILE_PX]);
+            }
+        }
+        tiles.sort_unstable();
+        tiles.dedup();
+        tiles
+    }
+
+    #[test]
+    fn tiles_with_steps_in_them_or_beside_them_are_marked() {
+        for (size_px, step) in [([100, 70], 7919), ([513, 40], 12_289), ([64, 9], 31), ([1105, 33], 24_593), ([2, 2], 1)] {
+            let [width, height] = size_px;
+            let stride = width + 9;
+            let mut depth: Large<f32> = Large::zeros(stride * height);
+            // A slope, with things before it here and there.
+            for (i, of) in depth.iter_mut().enumerate() {
+                *of = 0.01 + 1e-5 * (i % stride) as f32;
+            }
+            for k in (0..stride * height).step_by(step) {
+                let [place, ..] = pcg4d([k as u32, 1, 2, 3]);
+                let place = place as usize % (stride * height);
+                depth[place] *= 1.5;
+            }
+            let mut marks = Marks::default();
+            marks.clear(size_px);
+            marks.add_steps(&depth, stride);
+            let mut found = Vec::new();
+            for row in 0..height.div_ceil(TILE_PX) {
+                let of_band = marks.of_band(row / TILE_ROWS);
+                found.extend((0..width.div_ceil(TILE_PX)).filter(|&column| of_band.is_marked_at(column, row % TILE_ROWS)).map(|column| [column, row]));
+            }
+            found.sort_unstable();
+            assert_eq!(found, marked(&depth, stride, size_px), "{size_px:?}");
+        }
     }
 }

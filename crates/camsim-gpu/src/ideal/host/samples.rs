@@ -90,17 +90,15 @@ impl Sampled {
     }
 }
 
-/// What the middles of pixels show; tiles of models are marked.
+/// What of the ground the middles of pixels show. Tiles of models are marked: their samples tell all.
 #[inline(always)]
 fn draw_middles(shader: &Shader<'_>, band: &mut Band<'_>, marks: &mut [u64]) {
     for (number, chunk) in (0..).zip(shader.chunks) {
-        let of_band = band.number;
-        match chunk.is_of_ground {
-            true => band.draw(Fours, chunk, number, |_| true),
-            false => band.draw(Fours, chunk, number, |cover| {
-                add_triangle(marks, of_band, cover);
-                true
-            }),
+        if chunk.is_of_ground {
+            band.draw(Fours, chunk, number, |_| true);
+        } else {
+            let of_band = chunk.of_band(band.number).iter().map(|&triangle| &chunk.covers[triangle as usize]);
+            of_band.for_each(|cover| add_triangle(marks, band.number, cover));
         }
     }
 }
