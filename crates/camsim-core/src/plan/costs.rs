@@ -29,9 +29,9 @@ const ANY_READS_MS: f64 = 0.7;
 const TRIANGLES_MS: f64 = 0.04;
 const TERRAIN_MS: [f64; 2] = [0.8, 3.7];
 const MODELS_MS: [f64; 2] = [2.5, 2.0];
-/// What several samples a pixel take more, for any ideal frame and each of its pixels for one of the camera's: of the terrain, and of models.
-const TERRAIN_SAMPLES_MS: [f64; 2] = [0.5, 0.7];
-const MODELS_SAMPLES_MS: [f64; 2] = [2.0, 2.0];
+/// What several samples a pixel take more at most, in the same way.
+const TERRAIN_SAMPLES_MS: [f64; 2] = [2.0, 2.5];
+const MODELS_SAMPLES_MS: [f64; 2] = [8.0, 6.0];
 /// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
 const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;
@@ -77,7 +77,7 @@ impl Drawn {
 
     /// Of several samples a pixel, more.
     fn samples_ms(self, scale: f64) -> f64 {
-        let at_most = |[least, times]: [f64; 2]| least + times * scale * scale;
+        let at_most = |[least, times]: [f64; 2]| least + times * scale;
         self.terrain_ms.min(at_most(TERRAIN_SAMPLES_MS)) + self.models_ms.min(at_most(MODELS_SAMPLES_MS))
     }
 }

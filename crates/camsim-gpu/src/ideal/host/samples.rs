@@ -150,7 +150,9 @@ impl Samples {
         self.depth.resize(self.stride * BAND_ROWS, 0.0);
         self.shown.resize(self.stride * BAND_ROWS, SKY);
         let of_tile = TILE_PX * ALONG;
-        for (row, column) in (0..PIXEL_ROWS / TILE_PX).flat_map(|row| (0..width.div_ceil(TILE_PX)).map(move |column| (row, column))) {
+        // Up to where blocks end: tiles beside a step at the frame's border are marked there too.
+        let columns = width.next_multiple_of(LANES) / TILE_PX;
+        for (row, column) in (0..PIXEL_ROWS / TILE_PX).flat_map(|row| (0..columns).map(move |column| (row, column))) {
             if marks.is_marked_at(column, row) {
                 for row in row * of_tile..(row + 1) * of_tile {
                     let first = row * self.stride + column * of_tile;
