@@ -135,6 +135,7 @@ fn effects(engine: &Engine, is_measuring: bool) -> Outcome<()> {
 fn alike(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     let one_way = [
         ("quality.ideal_scale", "1.0"),
+        ("quality.ideal_samples", "1"),
         ("quality.footprint_taps", "1"),
         ("quality.silhouettes", "\"plain\""),
         ("quality.frames_per_ideal", "4"),
@@ -239,11 +240,12 @@ fn houses(engine: &Engine, is_measuring: bool) -> Outcome<()> {
     println!("|---|---|---|---|---|---|---|---|---|---|");
     let alike = [
         ("quality.ideal_scale", ALIKE.to_string()),
+        ("quality.ideal_samples", "1".to_owned()),
         ("quality.silhouettes", "\"plain\"".to_owned()),
         ("quality.frames_per_ideal", "1".to_owned()),
     ];
     for pitch_deg in PITCHES_DEG.into_iter().take(if is_measuring { PITCHES_DEG.len() } else { 1 }) {
-        for (way, sets) in [("as planned", &[][..]), ("alike", &alike[..2]), ("alike, an ideal frame each", &alike)] {
+        for (way, sets) in [("as planned", &[][..]), ("alike", &alike[..3]), ("alike, an ideal frame each", &alike)] {
             let pitch = ("camera.mount.angles_deg", format!("[0.0, {pitch_deg:?}, 0.0]"));
             let with_houses = sequence_of("benches/houses.toml", &[&[pitch], sets].concat())?;
             let mut terrain = Sequence::clone(&with_houses);
@@ -296,12 +298,13 @@ fn costs(engine: &Engine, is_measuring: bool) -> Outcome<()> {
         let exposed = sequence.scenario.camera.shutter.exposure_ms > 0.0;
         let samples = if exposed { COST_SAMPLES.map(Auto::Value).to_vec() } else { vec![Auto::Auto] };
         let (mut taken, mut foretold) = ([vec![], vec![]], [vec![], vec![]]);
-        let ways = || COST_SCALES.iter().flat_map(|scale| COST_TAPS.iter().map(move |taps| (*scale, *taps)));
-        for ((scale, taps), samples) in samples.into_iter().flat_map(|samples| ways().map(move |way| (way, samples))) {
+        let ideals = || COST_SCALES.iter().flat_map(|scale| [1, 4].map(|samples| (*scale, samples)));
+        let ways = || ideals().flat_map(|ideal| COST_TAPS.iter().map(move |taps| (ideal, *taps)));
+        for (((scale, ideal_samples), taps), samples) in samples.into_iter().flat_map(|samples| ways().map(move |way| (way, samples))) {
             let mut forced = Sequence::clone(&sequence);
             let quality = &mut forced.scenario.quality;
             (quality.frames_per_ideal, quality.silhouettes, quality.ideal_scale) = (1, Silhouettes::Plain, Auto::Value(scale));
-            (quality.footprint_taps, quality.blur_samples) = (taps, samples);
+            (quality.ideal_samples, quality.footprint_taps, quality.blur_samples) = (Auto::Value(ideal_samples), taps, samples);
             let Some(way) = pass_times(engine, Arc::new(forced), first)? else {
                 println!("\nthe adapter has no time stamps: no passes");
                 return Ok(());

@@ -31,7 +31,7 @@ const TERRAIN_MS: [f64; 2] = [0.8, 3.7];
 const MODELS_MS: [f64; 2] = [2.5, 2.0];
 /// What several samples a pixel take more at most, in the same way.
 const TERRAIN_SAMPLES_MS: [f64; 2] = [2.0, 2.5];
-const MODELS_SAMPLES_MS: [f64; 2] = [8.0, 6.0];
+const MODELS_SAMPLES_MS: [f64; 2] = [7.0, 4.0];
 /// Of reading the ideal frame once: bilinear, by a spline, by a grid of reads and for each more of them, by either.
 const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;

@@ -8,10 +8,14 @@ use super::{
     look::{Look, Scenery},
     prospect::Prospect,
 };
-use crate::scenario::{Auto, Silhouettes};
+use crate::scenario::{Auto, QualitySpec, Silhouettes};
 
 /// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost less than finer ones.
 const MOST_SCALE_WITH_RAYS: f64 = 2.83;
+
+/// Pixels of the largest ideal frame with several samples a pixel, of 12 bytes each on a device, and those along a side: the host draws twice as many there, whose places it knows up to 32 768.
+const MOST_SAMPLED_PX: u64 = 1 << 24;
+const MOST_SAMPLED_SIDE_PX: u32 = 16_000;
 
 /// Rays a pixel of an exposure where `quality.blur_samples` says how many samples it has.
 const LEAST_RAYS_BY_HAND: u32 = 32;
@@ -66,7 +70,7 @@ impl Look<'_> {
             quality,
             max_error_dn,
             least_scale: self.reach.least_scale(),
-            most_scale: self.most_scale(scenery),
+            most_scale: self.scale_of(scenery, self.planner.max_ideal_px, self.planner.max_side_px),
             ideal_share: self.ideal_share(scenery),
             may_have_samples: false,
             exposure: self.exposed(scenery.motion, &scenery.ideal).path(quality, &mut Vec::new()),
@@ -80,10 +84,15 @@ impl Look<'_> {
             return Picture::of(&choice, None, false, [1, 0]);
         };
         let of_plain = Task { may_have_samples: scenery.may_have_samples, ..task };
+        let most_sampled_scale = self.scale_of(scenery, MOST_SAMPLED_PX, MOST_SAMPLED_SIDE_PX.min(self.planner.max_side_px));
+        let may_be_plain = |sampling: &Sampling| {
+            let is_small = sampling.samples_a_pixel == 1 || sampling.scale <= most_sampled_scale;
+            is_small && is_up_to(FINEST_SCALE, sampling.scale, &of_plain)
+        };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
             None => prospect.choose(&of_plain, &|sampling, blur| {
-                let plain = is_up_to(FINEST_SCALE, sampling.scale, &of_plain).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
+                let plain = may_be_plain(sampling).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
                 Some(plain.error_dn.hypot(layers_dn))
             }),
         };
@@ -126,11 +135,11 @@ impl Look<'_> {
         Picture::of(&choice, silhouettes, rays == 0, [fine, rays])
     }
 
-    /// Scale from which on the ideal frame is too large.
-    fn most_scale(&self, scenery: &Scenery<'_>) -> f64 {
+    /// Scale from which on the ideal frame has more pixels, or more along a side.
+    fn scale_of(&self, scenery: &Scenery<'_>, pixels: u64, side_px: u32) -> f64 {
         let [width, height] = scenery.ideal.size_px.map(f64::from);
-        let by_area = (self.planner.max_ideal_px as f64 / (width * height)).sqrt();
-        by_area.min(f64::from(self.planner.max_side_px) / width.max(height)) * self.reach.least_scale()
+        let by_area = (pixels as f64 / (width * height)).sqrt();
+        by_area.min(f64::from(side_px) / width.max(height)) * self.reach.least_scale()
     }
 
     /// Pixels that are drawn of the ideal frame at scale 1 for each of the camera's.
@@ -212,6 +221,18 @@ impl WithRays<'_> {
         let scale = choice.sampling.scale;
         let rays_ms = prospect.rays_ms(outlook.share, scale, fine, count(scale, &rays), task.ideal_share);
         Choice { price: choice.price.with_rays(rays_ms), ..choice }
+    }
+}
+
+/// Why pixels of the ideal frame have one sample.
+pub(super) fn why_one_sample(scenery: &Scenery<'_>, picture: &Picture, quality: &QualitySpec) -> &'static str {
+    match (&scenery.outlook, quality.ideal_samples) {
+        _ if !scenery.may_have_samples => "surfaces have holes by their pictures, or are mixed with what is behind them: samples do not show such borders",
+        (None, _) => "nothing depends on where borders are",
+        _ if !picture.is_plain => "silhouettes have rays of their own",
+        (_, Auto::Value(1)) => "quality.ideal_samples is 1",
+        (_, Auto::Value(_)) => "the ideal frame has too many pixels",
+        (_, Auto::Auto) => "the middles of pixels keep quality.max_error_dn, or come as near, for less time",
     }
 }
 

@@ -103,6 +103,7 @@ fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
     };
     QualitySpec {
         ideal_scale: Auto::Value(plan.ideal.focal_px.x / plan.camera.focal_px.x),
+        ideal_samples: Auto::Value(plan.samples_a_pixel),
         footprint_taps: Auto::Value(taps),
         blur_samples: plan.blur.map_or(Auto::Auto, |blur| Auto::Value(blur.max_samples * blur.stretches())),
         silhouettes: if plan.edges.has_rays() && quality.silhouettes != Silhouettes::Plain {
