@@ -240,7 +240,8 @@ impl Planner {
         refusal::check_size(frame, ideal.size_px, self.max_side_px, self.max_ideal_px)?;
         let mut skipped = Vec::new();
         if sampling.samples_a_pixel == 1 && !look.is_paper() {
-            skipped.push(Skip { what: "several samples an ideal pixel", reason: picture::why_one_sample(scenery, &picture, quality).into() });
+            skipped
+                .push(Skip { what: "several samples an ideal pixel", reason: picture::why_one_sample(scenery, &picture, quality).into() });
         }
         let camera = &look.reach.camera;
         let ray = if look.is_paper() { paper::ray_stage(camera) } else { ray_stage(&look.reach, &mut skipped) };

@@ -259,6 +259,8 @@ impl Scenery<'_> {
     /// Whether silhouettes may be left as they are: another instant sees more of what is behind them than rays could make up for.
     pub fn may_be_shared(&self, quality: &QualitySpec, scale: f64) -> bool {
         let is_auto = quality.silhouettes == Silhouettes::Auto;
-        self.outlook.as_ref().is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale, self.may_have_samples).are_affordable(quality.max_error_dn))
+        self.outlook
+            .as_ref()
+            .is_none_or(|outlook| !is_auto || outlook.plain_at_best(scale, self.may_have_samples).are_affordable(quality.max_error_dn))
     }
 }

@@ -90,7 +90,9 @@ impl Look<'_> {
             is_small && is_up_to(FINEST_SCALE, sampling.scale, &of_plain)
         };
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
-            Some(given) => prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn))),
+            Some(given) => {
+                prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn)))
+            }
             None => prospect.choose(&of_plain, &|sampling, blur| {
                 let plain = may_be_plain(sampling).then(|| outlook.plain(sampling, blur)).filter(is_wanted)?;
                 Some(plain.error_dn.hypot(layers_dn))
@@ -227,7 +229,9 @@ impl WithRays<'_> {
 /// Why pixels of the ideal frame have one sample.
 pub(super) fn why_one_sample(scenery: &Scenery<'_>, picture: &Picture, quality: &QualitySpec) -> &'static str {
     match (&scenery.outlook, quality.ideal_samples) {
-        _ if !scenery.may_have_samples => "surfaces have holes by their pictures, or are mixed with what is behind them: samples do not show such borders",
+        _ if !scenery.may_have_samples => {
+            "surfaces have holes by their pictures, or are mixed with what is behind them: samples do not show such borders"
+        }
         (None, _) => "nothing depends on where borders are",
         _ if !picture.is_plain => "silhouettes have rays of their own",
         (_, Auto::Value(1)) => "quality.ideal_samples is 1",

@@ -222,8 +222,7 @@ impl HostScene {
         self.project_terrain(camera, view.terrain);
         self.collect(camera, view, pose, seen, jobs);
         let chunks = &self.chunks[..jobs.len()];
-        let shader =
-            Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
+        let shader = Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
         self.sampled.fill(&shader, &mut self.shown, into);
     }
 

@@ -10,6 +10,8 @@ use crate::{
     shaders::{self, ComposeError},
 };
 
+const _: () = assert!(FINE_SAMPLES == camsim_core::temporal::SAMPLES);
+
 /// Textures of samples.
 #[derive(Debug)]
 pub(super) struct SampledTarget {
@@ -79,7 +81,13 @@ impl MiddleDepthPass {
     }
 
     /// Writes to `depth`, of all of its pixels.
-    pub fn encode(&self, gpu: &GpuContext, recorder: &mut Recorder<'_>, from: &SampledTarget, depth: wgpu::RenderPassDepthStencilAttachment<'_>) {
+    pub fn encode(
+        &self,
+        gpu: &GpuContext,
+        recorder: &mut Recorder<'_>,
+        from: &SampledTarget,
+        depth: wgpu::RenderPassDepthStencilAttachment<'_>,
+    ) {
         let group = from.group.get_or_init(|| {
             let entries = [wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(&from.depth) }];
             let label = Some("camsim.ideal.middle_depth");

@@ -104,23 +104,17 @@ fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
     let width = here.len();
     for (block, steps) in steps.iter_mut().enumerate() {
         let first = block * LANES;
-        // Beyond the frame is what is at its border.
-        let at = |row: &[f32], x: isize| row[(first as isize + x).clamp(0, width as isize - 1) as usize];
-        let is_within = first > 0 && first + LANES < width;
         let mut across = [0.0; LANES + 2];
         let mut down = [[0.0; LANES]; 2];
-        if is_within {
+        if first > 0 && first + LANES < width {
             across.copy_from_slice(&here[first - 1..first + LANES + 1]);
             down[0].copy_from_slice(&above[first..first + LANES]);
             down[1].copy_from_slice(&below[first..first + LANES]);
         } else {
-            for i in 0..LANES + 2 {
-                across[i] = at(here, i as isize - 1);
-            }
-            for i in 0..LANES {
-                down[0][i] = at(above, i as isize);
-                down[1][i] = at(below, i as isize);
-            }
+            // Beyond the frame is what is at its border.
+            let at = |row: &[f32], x: usize| row[x.min(width - 1)];
+            across = std::array::from_fn(|i| at(here, (first + i).saturating_sub(1)));
+            down = [above, below].map(|row| std::array::from_fn(|i| at(row, first + i)));
         }
         let mut found = 0;
         for i in 0..LANES {
@@ -219,7 +213,11 @@ mod tests {
             let mut found = Vec::new();
             for row in 0..height.div_ceil(TILE_PX) {
                 let of_band = marks.of_band(row / TILE_ROWS);
-                found.extend((0..width.div_ceil(TILE_PX)).filter(|&column| of_band.is_marked_at(column, row % TILE_ROWS)).map(|column| [column, row]));
+                found.extend(
+                    (0..width.div_ceil(TILE_PX))
+                        .filter(|&column| of_band.is_marked_at(column, row % TILE_ROWS))
+                        .map(|column| [column, row]),
+                );
             }
             found.sort_unstable();
             assert_eq!(found, marked(&depth, stride, size_px), "{size_px:?}");

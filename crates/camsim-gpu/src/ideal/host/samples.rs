@@ -161,8 +161,7 @@ impl Samples {
                 }
             }
         }
-        let mut band =
-            Band { number, stride: self.stride, depth: &mut self.depth, shown: &mut self.shown };
+        let mut band = Band { number, stride: self.stride, depth: &mut self.depth, shown: &mut self.shown };
         for (number, chunk) in (0..).zip(shader.chunks) {
             band.draw(cover::Samples, chunk, number, |cover| marks.has(cover));
         }
@@ -170,7 +169,14 @@ impl Samples {
 
     /// What some pixels of a row show by their samples: those that show one surface have it in the block, the others' parts are kept.
     #[inline(always)]
-    fn look(&mut self, shader: &Shader<'_>, [column, row]: [usize; 2], pixels: std::ops::Range<usize>, block: &mut Block, depth: &mut [f32; LANES]) {
+    fn look(
+        &mut self,
+        shader: &Shader<'_>,
+        [column, row]: [usize; 2],
+        pixels: std::ops::Range<usize>,
+        block: &mut Block,
+        depth: &mut [f32; LANES],
+    ) {
         for i in pixels {
             let first = ALONG * row * self.stride + ALONG * (column + i);
             let second = first + self.stride;

@@ -212,15 +212,7 @@ impl Shader<'_> {
     }
 
     #[inline(always)]
-    fn paint(
-        &self,
-        vectors: impl Vectors,
-        paint: &Paint,
-        block: &Block,
-        seen: &Seen,
-        is_asked: &[bool; LANES],
-        into: &mut Colors,
-    ) {
+    fn paint(&self, vectors: impl Vectors, paint: &Paint, block: &Block, seen: &Seen, is_asked: &[bool; LANES], into: &mut Colors) {
         let read = match &*paint.picture {
             Picture::Uniform(color) => [*color; LANES],
             Picture::Texels(texels) => colors(vectors, texels, self.reads, &seen.coordinates, is_asked),

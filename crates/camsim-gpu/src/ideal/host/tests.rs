@@ -85,8 +85,11 @@ fn sheet_by(camera: &Camera, cells: u32, place: impl Fn([f32; 2]) -> [f32; 3]) -
     (0..cells * cells).flat_map(|k| pair(k % cells, k / cells)).collect()
 }
 
-/// From 0.3 to 400 px a cell, and past all borders, so that corners far beyond them are cut; whether there are small triangles, and large ones.
-fn walls() -> [(&'static str, Vec<[Corner<2>; 3]>, [bool; 2]); 6] {
+/// Triangles, and whether there are small ones and large ones.
+type Wall = (&'static str, Vec<[Corner<2>; 3]>, [bool; 2]);
+
+/// From 0.3 to 400 px a cell, and past all borders, so that corners far beyond them are cut.
+fn walls() -> [Wall; 6] {
     let wall = |side_m: f32| move |[x, y]: [f32; 2]| [side_m * (x - 0.5), side_m * (y - 0.5), 10.0];
     [
         ("small", sheet(60, wall(22.0)), [true, false]),
@@ -193,7 +196,10 @@ fn triangles_cover_what_64_bits_say() {
         let pixels = covered_exactly(Pixels, 0, reach_m);
         let samples = covered_exactly(Samples, SUBPIXELS / 2, reach_m);
         let fours = covered_exactly(Fours, SUBPIXELS / 2, reach_m);
-        assert!(pixels > 10_000 && pixels.abs_diff(samples) < pixels / 20 && pixels.abs_diff(4 * fours) < pixels / 20, "{pixels} {samples} {fours}");
+        assert!(
+            pixels > 10_000 && pixels.abs_diff(samples) < pixels / 20 && pixels.abs_diff(4 * fours) < pixels / 20,
+            "{pixels} {samples} {fours}"
+        );
     }
 }
 
