@@ -95,6 +95,12 @@ impl IdealTarget {
             && self.sampled.is_some() == (plan.samples_a_pixel > 1)
     }
 
+    /// Whether it has textures of several samples a pixel, for whatever.
+    #[must_use]
+    pub fn has_samples(&self) -> bool {
+        self.fine.is_some() || self.sampled.is_some()
+    }
+
     /// Allocates.
     #[must_use]
     pub fn new(gpu: &GpuContext, allocated_px: [u32; 2], plan: &FramePlan) -> Self {

@@ -6,8 +6,9 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{FlightSpec, HeightReference, Scenario},
+    scenario::{Auto, FlightSpec, HeightReference, Scenario},
     sequence::Sequence,
+    temporal::SAMPLES,
     tracker::{Tracked, TrackerError, track},
 };
 use glam::DVec2;
@@ -324,6 +325,11 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
         warnings.push(format!(
             "the flight starts {:.0} km from the origin of the local frame: check flight.origin and the log's positions",
             far_m / 1e3
+        ));
+    }
+    if sequence.scenario.quality.ideal_samples == Auto::Value(SAMPLES) && !sequence.scene.has_borders_of_triangles() {
+        warnings.push(format!(
+            "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"
         ));
     }
     let fps = sequence.scenario.camera.fps;

@@ -195,9 +195,9 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
     let rms_dn = |psnr_db: f64| 255.0 * 10_f64.powf(-psnr_db / 20.0);
     for case in cases().expect("cases").iter().filter(|case| case.name == "buildings-15" || long && case.name == "vibration-200") {
         let truth = Truth::new(&case.sequence).expect("a truth");
-        let with = |silhouettes: Silhouettes, ideal_scale: Auto<f64>| {
+        let with = |silhouettes: Silhouettes, ideal_scale: Auto<f64>, ideal_samples: Auto<u32>| {
             let mut sequence = (*case.sequence).clone();
-            sequence.scenario.quality = QualitySpec { silhouettes, ideal_scale, ..QualitySpec::default() };
+            sequence.scenario.quality = QualitySpec { silhouettes, ideal_scale, ideal_samples, ..QualitySpec::default() };
             let sequence = Arc::new(sequence);
             let mut found = None;
             let measure = &mut |done: Finished| {
@@ -213,28 +213,28 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
                 .expect("rendered");
             found.expect("a frame")
         };
-        for scale in [1.0, 1.6] {
-            let (all_dn, smooth_dn, plan) = with(Silhouettes::Plain, Auto::Value(scale));
+        for (scale, samples) in [1.0, 1.6].into_iter().flat_map(|scale| [(scale, 1), (scale, 4)]) {
+            let (all_dn, smooth_dn, plan) = with(Silhouettes::Plain, Auto::Value(scale), Auto::Value(samples));
             let predicted = plan.predicted.silhouettes.expect("silhouettes in view");
-            assert_eq!(plan.edges, EdgeStage::None);
+            assert_eq!((plan.edges, plan.samples_a_pixel), (EdgeStage::None, samples));
             let measured_dn = (all_dn * all_dn - smooth_dn * smooth_dn).max(0.0).sqrt();
             let ratio = measured_dn / predicted.error_dn;
             eprintln!(
-                "{} at {scale}: all {all_dn:.3}, without silhouettes {smooth_dn:.3}, so by them {measured_dn:.3}; {predicted:.3?}, ratio {ratio:.2}",
+                "{} at {scale}, {samples}: all {all_dn:.3}, without silhouettes {smooth_dn:.3}, so by them {measured_dn:.3}; {predicted:.3?}, ratio {ratio:.2}",
                 case.name
             );
-            assert!((BELOW..ABOVE).contains(&ratio), "{} at {scale}: {measured_dn:.3} for {:.3}", case.name, predicted.error_dn);
+            assert!((BELOW..ABOVE).contains(&ratio), "{} at {scale}, {samples}: {measured_dn:.3} for {:.3}", case.name, predicted.error_dn);
         }
-        let (all_dn, _, plan) = with(Silhouettes::Auto, Auto::Auto);
-        let (rays_dn, _, with_rays) = with(Silhouettes::Rays, Auto::Auto);
+        let (all_dn, _, plan) = with(Silhouettes::Auto, Auto::Auto, Auto::Auto);
+        let (rays_dn, _, with_rays) = with(Silhouettes::Rays, Auto::Auto, Auto::Auto);
         eprintln!("{}: {all_dn:.3} as planned, {rays_dn:.3} with rays", case.name);
         assert!(plan.edges == EdgeStage::None && plan.predicted.levels_kept && all_dn < ABOVE);
         let ratio = rays_dn / with_rays.predicted.picture_dn();
         assert!(with_rays.edges.has_rays() && with_rays.predicted.levels_kept, "{:?}", with_rays.predicted);
         assert!((BELOW..ABOVE).contains(&ratio), "{}: {rays_dn:.3} with rays, {ratio:.2} of the prediction", case.name);
         assert!(plan.price_ms < with_rays.price_ms, "dearer than rays: {} {}", plan.price_ms, with_rays.price_ms);
-        // Too little for the stairs even of the finest ideal frame.
-        let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0));
+        // Too little for the stairs of whole pixels.
+        let (_, _, forced) = with(Silhouettes::Plain, Auto::Value(1.0), Auto::Value(1));
         assert!(
             !forced.predicted.levels_kept && forced.predicted.levels_in_the_way.is_some_and(|cause| cause.contains("quality.silhouettes"))
         );

@@ -106,8 +106,7 @@ impl Task<'_> {
     fn samples(&self) -> &'static [u32] {
         match (self.may_have_samples, self.quality.ideal_samples) {
             (false, _) | (_, Auto::Value(1)) => &[1],
-            (true, Auto::Auto) => &[1, SAMPLES],
-            (true, Auto::Value(_)) => &[SAMPLES],
+            (true, _) => &[1, SAMPLES],
         }
     }
 }

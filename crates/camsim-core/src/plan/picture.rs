@@ -8,7 +8,10 @@ use super::{
     look::{Look, Scenery},
     prospect::Prospect,
 };
-use crate::scenario::{Auto, QualitySpec, Silhouettes};
+use crate::{
+    scenario::{Auto, QualitySpec, Silhouettes},
+    temporal::SAMPLES,
+};
 
 /// Largest scale of an ideal frame of 4 samples a pixel: more pixels, whose samples have depth alone, cost less than finer ones.
 const MOST_SCALE_WITH_RAYS: f64 = 2.83;
@@ -86,9 +89,13 @@ impl Look<'_> {
         let of_plain = Task { may_have_samples: scenery.may_have_samples, ..task };
         let most_sampled_scale = self.scale_of(scenery, MOST_SAMPLED_PX, MOST_SAMPLED_SIDE_PX.min(self.planner.max_side_px));
         let may_be_plain = |sampling: &Sampling| {
-            let is_small = sampling.samples_a_pixel == 1 || sampling.scale <= most_sampled_scale;
-            is_small && is_up_to(FINEST_SCALE, sampling.scale, &of_plain)
+            let (is_one, is_small) = (sampling.samples_a_pixel == 1, sampling.scale <= most_sampled_scale);
+            // Several that are asked for are taken wherever they can be.
+            let is_asked = is_small != is_one || quality.ideal_samples != Auto::Value(SAMPLES) || !scenery.may_have_samples;
+            (is_one || is_small) && is_asked && is_up_to(FINEST_SCALE, sampling.scale, &of_plain)
         };
+        // Samples that are asked for are for silhouettes that are left as they are.
+        let is_plain_by_hand = quality.silhouettes == Silhouettes::Plain || quality.ideal_samples == Auto::Value(SAMPLES);
         let plain_if = |is_wanted: &dyn Fn(&Contours) -> bool| match given {
             Some(given) => {
                 prospect.given(&given, &of_plain, &|sampling, blur| Some(outlook.plain(sampling, blur).error_dn.hypot(layers_dn)))
@@ -98,7 +105,7 @@ impl Look<'_> {
                 Some(plain.error_dn.hypot(layers_dn))
             }),
         };
-        let plain = || plain_if(&|plain| quality.silhouettes == Silhouettes::Plain || plain.are_affordable(max_error_dn));
+        let plain = || plain_if(&|plain| is_plain_by_hand || plain.are_affordable(max_error_dn));
         let rays = |scale: f64, &Rays { fine, most_part }: &Rays| match (quality.blur_samples, task.exposure) {
             (Auto::Value(samples), Some(_)) => samples.clamp(LEAST_RAYS_BY_HAND * fine, MOST_RAYS_BY_HAND).next_power_of_two(),
             _ => outlook.rays(scale, fine, most_part),
@@ -112,6 +119,7 @@ impl Look<'_> {
         };
         let (choice, kind) = match quality.silhouettes {
             Silhouettes::Plain => (plain(), None),
+            Silhouettes::Auto if is_plain_by_hand && scenery.may_have_samples => (plain(), None),
             // Another instant sees more of what is behind a silhouette than rays could make up for.
             Silhouettes::Auto if self.common.is_some() => (plain(), None),
             Silhouettes::Auto if quality.key_frames == Auto::Auto => {
@@ -235,8 +243,8 @@ pub(super) fn why_one_sample(scenery: &Scenery<'_>, picture: &Picture, quality: 
         (None, _) => "nothing depends on where borders are",
         _ if !picture.is_plain => "silhouettes have rays of their own",
         (_, Auto::Value(1)) => "quality.ideal_samples is 1",
-        (_, Auto::Value(_)) => "the ideal frame has too many pixels",
-        (_, Auto::Auto) => "the middles of pixels keep quality.max_error_dn, or come as near, for less time",
+        (_, Auto::Value(_)) => "an ideal frame of that scale has too many pixels for them",
+        (_, Auto::Auto) => "one keeps quality.max_error_dn, or comes as near, for less time",
     }
 }
 

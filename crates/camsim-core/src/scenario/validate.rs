@@ -216,6 +216,11 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     check.require(quality.ideal_samples.value().is_none_or(|samples| [1, SAMPLES].contains(&samples)), "quality.ideal_samples", || {
         format!("must be \"auto\", 1 or {SAMPLES} samples of each pixel of the ideal frame")
     });
+    check.require(
+        quality.silhouettes != Silhouettes::Rays || quality.ideal_samples != Auto::Value(SAMPLES),
+        "quality.ideal_samples",
+        || "is for silhouettes without rays of their own, which quality.silhouettes = \"rays\" asks for; leave one of them out".into(),
+    );
     check.require(quality.ideal_scale.value().is_none_or(|scale| (1.0..=5.0).contains(&scale)), "quality.ideal_scale", || {
         "must be 1 to 5 pixels of the ideal frame for each of the camera's, or \"auto\"".into()
     });
@@ -423,6 +428,10 @@ mod tests {
             ("quality.footprint_taps", |s| s.quality.footprint_taps = Auto::Value(MAX_FOOTPRINT_TAPS + 1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(MAX_ITERATIONS + 1)),
             ("quality.ideal_samples", |s| s.quality.ideal_samples = Auto::Value(2)),
+            ("quality.ideal_samples", |s| {
+                s.quality.ideal_samples = Auto::Value(SAMPLES);
+                s.quality.silhouettes = Silhouettes::Rays;
+            }),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(0.5)),
             ("quality.ideal_scale", |s| s.quality.ideal_scale = Auto::Value(5.1)),
             ("quality.iterations", |s| s.quality.iterations = Auto::Value(0)),

@@ -108,9 +108,9 @@ impl Session<'_> {
         // The one used last stands last; `drawn` may name another's place, but is replaced below before anybody looks.
         let known = self.targets.iter().position(|target| target.ideal.serves(size_px, plan));
         let target = known.map(|place| self.targets.remove(place)).unwrap_or_else(|| {
-            let fine = plan.edges != EdgeStage::None;
-            let limit = if fine { MAX_FINE_TARGETS } else { MAX_TARGETS };
-            let alike = |target: &Target| target.ideal.fine.is_some() == fine;
+            let has_samples = plan.edges != EdgeStage::None || plan.samples_a_pixel > 1;
+            let limit = if has_samples { MAX_FINE_TARGETS } else { MAX_TARGETS };
+            let alike = |target: &Target| target.ideal.has_samples() == has_samples;
             if self.targets.iter().filter(|target| alike(target)).count() >= limit {
                 let longest_unused = self.targets.iter().position(alike).unwrap_or_default();
                 self.targets.remove(longest_unused);
