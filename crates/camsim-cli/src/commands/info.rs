@@ -11,7 +11,7 @@ use crate::{console::Console, failure::Failure};
 /// Show graphics adapters, driver and limits, and which one is used
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host draws ideal frames and makes output frames from them where it can; CAMSIM_REVERSE=device leaves both to the\nadapter, CAMSIM_REVERSE=host makes all output frames that it can, beside any adapter; CAMSIM_IDEAL=device or host says who draws the ideal\nframes of those. Pictures differ by rounding."
+    after_help = "CAMSIM_ADAPTER=part-of-a-name picks another adapter. Exit code 3 if there is none.\n\nOn a software adapter the host draws ideal frames and makes output frames from them where it can; CAMSIM_REVERSE=device leaves both to the\nadapter, CAMSIM_REVERSE=host makes all output frames that it can, beside any adapter; CAMSIM_IDEAL=device or host says who draws the ideal\nframes of those. Pictures differ by rounding, and at borders\nof surfaces a little more where ideal frames have four samples a pixel."
 )]
 pub struct Args {
     /// Print JSON
