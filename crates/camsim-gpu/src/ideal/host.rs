@@ -127,6 +127,16 @@ pub(crate) struct View<'a> {
     pub tolerance: &'a LevelTolerance,
 }
 
+/// A view, as what is drawn of it is seen.
+#[derive(Clone, Copy)]
+struct Drawing<'a> {
+    camera: Camera,
+    pose: &'a CameraPose,
+    view: View<'a>,
+    /// Places of meshes that may be in view.
+    seen: &'a [u32],
+}
+
 /// Whether the host can draw a scene: not with pictures larger than a texture, mirrored beyond their borders or with sharp texels, with holes, or with blended surfaces, which only the
 /// device draws.
 #[must_use]
@@ -173,54 +183,40 @@ impl HostScene {
         let mut parts = terrain_parts(view.terrain);
         self.add_parts(&drawn, &mut parts);
         let jobs = jobs(parts);
+        let drawing = Drawing { camera, pose: &key.pose, view, seen: &seen };
         match view.plan.samples_a_pixel {
-            1 => self.draw_all(Pixels, &camera, &view, &key.pose, &seen, &jobs, into),
-            _ => self.draw_samples(&camera.of_samples(), &view, &key.pose, &seen, &jobs, into),
+            1 => self.draw_all(Pixels, &drawing, &jobs, into),
+            _ => self.draw_samples(&Drawing { camera: camera.of_samples(), ..drawing }, &jobs, into),
         }
     }
 
     /// Draws so many chunks at once, each number of them over what is there.
-    fn draw_all<P: Places>(
-        &mut self,
-        places: P,
-        camera: &Camera,
-        view: &View<'_>,
-        pose: &CameraPose,
-        seen: &[u32],
-        jobs: &[Vec<Part>],
-        into: &mut DrawnFrame,
-    ) {
+    fn draw_all<P: Places>(&mut self, places: P, drawing: &Drawing<'_>, jobs: &[Vec<Part>], into: &mut DrawnFrame) {
+        let Drawing { camera, view, .. } = drawing;
         into.fit(camera.size_px);
         self.shown.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
         for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
             let first = round * CHUNKS_A_ROUND;
             let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
-            self.collect(camera, view, pose, seen, jobs);
+            self.collect(drawing, jobs);
             self.fill(places, camera, view.plan, jobs.len(), round > 0, into);
         }
     }
 
     /// The same of several samples a pixel, as their camera sees them.
-    fn draw_samples(
-        &mut self,
-        camera: &Camera,
-        view: &View<'_>,
-        pose: &CameraPose,
-        seen: &[u32],
-        jobs: &[Vec<Part>],
-        into: &mut DrawnFrame,
-    ) {
+    fn draw_samples(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>], into: &mut DrawnFrame) {
+        let Drawing { camera, view, .. } = drawing;
         into.fit(view.plan.ideal.size_px);
         if jobs.len() > CHUNKS_A_ROUND {
             // What samples show would have to be kept from one round to the next: each is drawn as a pixel.
             let mut samples = DrawnFrame::default();
-            self.draw_all(cover::Samples, camera, view, pose, seen, jobs, &mut samples);
+            self.draw_all(cover::Samples, drawing, jobs, &mut samples);
             return samples::mix(&samples, view.plan.ideal.size_px, into);
         }
         self.shown.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        self.collect(camera, view, pose, seen, jobs);
+        self.collect(drawing, jobs);
         let chunks = &self.chunks[..jobs.len()];
         let shader = Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
         self.sampled.fill(&shader, &mut self.shown, into);
@@ -254,8 +250,8 @@ impl HostScene {
     }
 
     /// Triangles of all jobs, and which bands they are in.
-    fn collect(&mut self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], jobs: &[Vec<Part>]) {
-        let bands = (camera.size_px[1] as usize).div_ceil(BAND_ROWS);
+    fn collect(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>]) {
+        let bands = (drawing.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
         if chunks.len() < jobs.len() {
             chunks.resize_with(jobs.len(), Chunk::default);
@@ -263,18 +259,19 @@ impl HostScene {
         jobs.par_iter().zip(&mut *chunks).for_each(|(job, chunk)| {
             chunk.clear();
             chunk.is_of_ground = matches!(job.first(), Some(Part::Terrain(_)));
-            self.triangles_of(camera, view, pose, seen, job, chunk);
+            self.triangles_of(drawing, job, chunk);
             chunk.sort(bands);
         });
         self.chunks = chunks;
     }
 
-    fn triangles_of(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], job: &[Part], chunk: &mut Chunk) {
-        widest!(_vectors => job.iter().for_each(|part| self.triangles(camera, view, pose, seen, part, chunk)))
+    fn triangles_of(&self, drawing: &Drawing<'_>, job: &[Part], chunk: &mut Chunk) {
+        widest!(_vectors => job.iter().for_each(|part| self.triangles(drawing, part, chunk)))
     }
 
     #[inline(always)]
-    fn triangles(&self, camera: &Camera, view: &View<'_>, pose: &CameraPose, seen: &[u32], part: &Part, chunk: &mut Chunk) {
+    fn triangles(&self, drawing: &Drawing<'_>, part: &Part, chunk: &mut Chunk) {
+        let Drawing { camera, pose, view, seen } = drawing;
         match part {
             Part::Terrain(of) => {
                 let kind = Kind { paint: GROUND, one_sided: false, sky: None };
