@@ -5,7 +5,7 @@
 //! ([`render`]) are its own. The seeded photometric stage is the renderer's, since a seed has no other meaning than its noise.
 //! What its measurements count apart as a silhouette is defined once, for them and for the plan's prediction.
 
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DVec2, DVec3};
 
@@ -234,11 +234,13 @@ impl Oracle {
     }
 
     fn zoomed_eye(&self, zoom: f64) -> Option<Arc<Eye>> {
-        let mut kept = self.zoomed.lock().ok()?;
-        if let Some((_, eye)) = kept.iter().find(|(bits, _)| *bits == zoom.to_bits()) {
+        // Not held while it is made: that is done in parallel, and a thread that waits for its parts may take up work that asks for an eye itself.
+        let kept = || self.zoomed.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, eye)) = kept().iter().find(|(bits, _)| *bits == zoom.to_bits()) {
             return Some(eye.clone());
         }
         let made = Arc::new(eye_at_zoom(&self.sequence.scenario.camera, zoom).ok()?);
+        let mut kept = kept();
         if kept.len() >= ZOOMED_KEPT {
             kept.remove(0);
         }

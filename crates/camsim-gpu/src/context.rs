@@ -57,7 +57,7 @@ pub enum AdapterChoice {
     /// `CAMSIM_ADAPTER` (part of a name) if set, else discrete before integrated before software.
     #[default]
     Best,
-    /// A software adapter; tests use it so that figures compare between machines.
+    /// `CAMSIM_ADAPTER` if set, else a software adapter: tests use it, so that figures compare between machines unless a GPU is asked for.
     Software,
 }
 
@@ -150,7 +150,7 @@ fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
     let mut found = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
     found.retain(|adapter| {
         let info = adapter.get_info();
-        let of_kind = choice != AdapterChoice::Software || info.device_type == wgpu::DeviceType::Cpu;
+        let of_kind = choice == AdapterChoice::Best || wanted.is_some() || info.device_type == wgpu::DeviceType::Cpu;
         let named = wanted.as_ref().is_none_or(|name| info.name.to_lowercase().contains(name));
         of_kind && named && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
     });

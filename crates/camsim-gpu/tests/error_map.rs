@@ -116,6 +116,23 @@ fn frames_of_one_ideal_frame_have_their_own_maps() {
     }
 }
 
+/// What is worked out once for all places is worked out in parallel: places that wait for it may not keep its parts from being done.
+#[test]
+fn as_many_threads_as_there_are_leave_each_other_free() {
+    let (done, is_done) = std::sync::mpsc::channel();
+    let work = move || {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build().expect("threads");
+        // A pan during a long exposure over things of many depths asks what look-ups find at mid-exposure.
+        let sequence = flown(camera(), hills());
+        for _ in 0..20 {
+            pool.install(|| mapped(&sequence, 3));
+        }
+        done.send(()).expect("somebody waits");
+    };
+    std::thread::spawn(work);
+    is_done.recv_timeout(std::time::Duration::from_secs(100)).expect("threads wait for each other");
+}
+
 /// By exact rays at random pixels, away from silhouettes as the map itself knows them.
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]

@@ -102,6 +102,13 @@ impl Forecast<'_> {
         }
     }
 
+    /// Has worked out what [`Forecast::error_px`] asks for.
+    pub(super) fn prepare(&self, way: Way) {
+        if way.look_ups_of_mid().is_some() {
+            self.of_mid();
+        }
+    }
+
     fn of_mid(&self) -> &[OfMid] {
         self.of_mid.get_or_init(|| self.of_mid_of(1))
     }

@@ -101,6 +101,8 @@ impl Planner {
         let detail = super::terrain_detail(&self.sequence, &key_pose, &ideal, plan.terrain_error_px);
         let forecast = truths.forecast(detail.as_ref());
         let everywhere_px = SAFETY * forecast.between_px(way) + forecast.missed(way.blur).largest_px;
+        // What all places ask for is worked out in parallel itself: a thread that waits for its parts would take up a place that waits for it.
+        forecast.prepare(way);
         let known = truths.looked.par_iter().zip(&forecast.outcomes).enumerate().with_min_len(16).map(|(i, (looked, run))| {
             let px = SAFETY * forecast.error_px(i, way) + forecast.rounding(looked, run, way.temporal).total_px();
             let error = if truths.is_apart(looked) { PlaceError::Silhouette } else { PlaceError::Within(px) };
