@@ -17,7 +17,7 @@ pub use lens_inverse::INVALID_UV;
 pub use zoom::ZoomTable;
 
 /// Largest width or height: what every GPU of the last decade can hold is 16384; twice that is a typing error.
-const MAX_SIZE_PX: u32 = 32_768;
+pub(crate) const MAX_SIZE_PX: u32 = 32_768;
 
 /// What can be wrong with a camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

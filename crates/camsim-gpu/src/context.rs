@@ -1,8 +1,6 @@
 //! Adapter and device.
 
-use std::fmt;
-
-use camsim_core::scene::TexelForm;
+use std::{fmt, sync::LazyLock};
 
 use crate::reverse::host::{self, ReverseOn};
 
@@ -113,8 +111,6 @@ pub struct GpuContext {
     pub(crate) max_picture_px: u32,
     /// Pixels of a line that a thread of the reverse kernel takes.
     pub(crate) pixels_a_thread: u32,
-    /// How pictures are held.
-    pub(crate) texels: TexelForm,
     /// Where the reverse pipeline runs.
     pub(crate) reverse_on: ReverseOn,
     /// Whether the host draws the ideal frames that it reads.
@@ -123,13 +119,16 @@ pub struct GpuContext {
 
 /// Vulkan, Metal, DirectX 12: what has compute shaders everywhere. GL is not even probed, it prints to stderr on headless machines.
 ///
+/// One for all engines, and never dropped: with the last instance the loader unloads the driver, and NVIDIA's has left something to be done at the end of every
+/// thread that called it. A thread that ends after that crashes.
+///
 /// Arguments of indirect calls come from camsim's own shaders, which bound them; wgpu's check of each would be a pass of its own, and a buffer
 /// made for it.
-fn instance() -> wgpu::Instance {
+static INSTANCE: LazyLock<wgpu::Instance> = LazyLock::new(|| {
     let from_env = wgpu::InstanceDescriptor::new_without_display_handle_from_env();
     let flags = from_env.flags.difference(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(wgpu::InstanceDescriptor { backends: from_env.backends & wgpu::Backends::PRIMARY, flags, ..from_env })
-}
+});
 
 /// All adapters of this machine, the one that would be used first.
 #[must_use]
@@ -147,7 +146,7 @@ fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
         (wgpu::DeviceType::Cpu, _) => 4,
         (wgpu::DeviceType::Other, _) => 5,
     };
-    let mut found = pollster::block_on(instance().enumerate_adapters(wgpu::Backends::PRIMARY));
+    let mut found = pollster::block_on(INSTANCE.enumerate_adapters(wgpu::Backends::PRIMARY));
     found.retain(|adapter| {
         let info = adapter.get_info();
         let of_kind = choice == AdapterChoice::Best || wanted.is_some() || info.device_type == wgpu::DeviceType::Cpu;
@@ -211,10 +210,10 @@ impl GpuContext {
             pollster::block_on(request).map_err(|error| GpuError::NoDevice { adapter: summary.name.clone(), reason: error.to_string() })?;
         let max_picture_px = device.limits().max_texture_dimension_2d;
         let is_software = info.device_type == wgpu::DeviceType::Cpu;
-        let (pixels_a_thread, texels) = if is_software { (SOFTWARE_PIXELS, TexelForm::Light) } else { (1, TexelForm::Stored) };
+        let pixels_a_thread = if is_software { SOFTWARE_PIXELS } else { 1 };
         let reverse_on = reverse_on(is_software)?;
         let ideal_on_host = ideal_on_host(is_software, reverse_on)?;
-        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, texels, reverse_on, ideal_on_host })
+        Ok(Self { device, queue, adapter: summary, is_software, max_picture_px, pixels_a_thread, reverse_on, ideal_on_host })
     }
 
     /// What renders, for people: the adapter, and that the host has a part in it where it has.

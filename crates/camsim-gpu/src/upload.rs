@@ -188,7 +188,7 @@ fn upload_terrain(gpu: &GpuContext, terrain: &Terrain) -> Result<TerrainBuffers,
             check_picture(gpu, &terrain.texture, "scene.terrain.ortho")?;
             GroundPicture::Whole(None)
         }
-        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain, gpu.texels))),
+        false => GroundPicture::Tiles(Box::new(TilePool::new(terrain, TexelForm::Light))),
     };
     Ok(TerrainBuffers { picture })
 }
@@ -278,7 +278,7 @@ fn upload_texture(gpu: &GpuContext, texture: &Texture) -> wgpu::TextureView {
     let form = match (texture.encoding, texture.size_px) {
         // Every device has the exact light of these bytes, and there are no smaller versions: a half would only round.
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
-        _ => gpu.texels,
+        _ => TexelForm::Light,
     };
     let mips = texture.mips(form);
     let mut data = texture.texels(&texture.rgba8, form).into_owned();

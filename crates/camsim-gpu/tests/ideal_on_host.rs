@@ -16,7 +16,7 @@ use camsim_gpu::{
     reverse::host::ReverseOn,
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
-use common::{city, engine, pattern, scenario, sequence, steady};
+use common::{city, engine, is_software, pattern, scenario, sequence, steady};
 use glam::{DMat3, DQuat, DVec3};
 
 /// Sides that no block divides.
@@ -180,7 +180,11 @@ fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, fram
     assert!(seen > 0.3, "{name}: something to be seen");
     match width_m {
         // Among boxes 5e-5 and 0.12/255 were found, half of them what half floats are cut off to there; depth is floats' rounding, and the grid's for thin triangles, 1.8e-6 at most.
-        None => assert!(found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < 3e-6, "{name}: {found:?}"),
+        // Circuits have the depth of the corners that they moved: by 1/512 px each way, of a surface at a slant that has another depth a few hundred pixels on.
+        None => {
+            let most_depth = if is_software(&engines[1]) { 3e-6 } else { 1e-5 };
+            assert!(found.otherwise < 2e-4 && found.rms_dn < 0.2 && found.inverse_depth < most_depth, "{name}: {found:?}");
+        }
         Some(width_m) => {
             let [of_host, of_device] = [&host, &device].map(|images| from_exact(images, &by_host.plan, width_m));
             eprintln!("  from exact: host {of_host:?}, device {of_device:?}");

@@ -22,7 +22,7 @@ use camsim_gpu::{
     },
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
-use common::{city, engine, pattern, scenario, sequence, steady};
+use common::{city, engine, is_software, pattern, scenario, sequence, steady};
 use glam::DVec3;
 
 /// Sides that no block divides.
@@ -103,18 +103,21 @@ fn assert_same(name: &str, engines: &[Engine; 2], sequence: &Arc<Sequence>, fram
     eprintln!("{name}: {far} of {pixels} pixels far apart, the others {rms:.1e}");
     assert!(device.chunks_exact(4).filter(|pixel| pixel[3] > 0.0).count() > pixels / 2, "{name}: a picture");
     assert!(far * 5000 <= pixels, "{name}: {far} pixels far apart");
-    assert!(rms < 1e-5, "{name}: {rms:.1e}");
+    // Texels weighed with 8 bits: 2^-9 of what neighbours are apart at most, along each axis.
+    let most_rms = if is_software(&engines[1]) { 1e-5 } else { 3e-4 };
+    assert!(rms < most_rms, "{name}: {rms:.1e}");
     assert_same_truth(name, &by_host, &by_device);
     by_host.plan
 }
 
-/// Of a hundred pixels 99 agree about the source to 1e-3 px, about the depth to 1e-5 of it.
+/// All but one in a thousand pixels agree about the ray and the time to some units in the last place of floats about 1, 99 of a hundred about the source to 1e-3 px, about the depth to
+/// 1e-5 of it.
 fn assert_same_truth(name: &str, by_host: &Finished, by_device: &Finished) {
     let truth = |done: &Finished| (done.frame.coords.clone().expect("coords"), done.frame.depth_m.clone().expect("depth"));
     let ((host, host_m), (device, device_m)) = (truth(by_host), truth(by_device));
     let seen: Vec<usize> = (0..host_m.len()).filter(|&i| host_m[i] > 0.0 && device_m[i] > 0.0).collect();
     let differ = (0..host_m.len())
-        .filter(|&i| (host_m[i] > 0.0) != (device_m[i] > 0.0) || host[i][0] != device[i][0] || host[i][4] != device[i][4])
+        .filter(|&i| (host_m[i] > 0.0) != (device_m[i] > 0.0) || [0, 4].iter().any(|&k| (host[i][k] - device[i][k]).abs() > 5e-7))
         .count();
     assert!(seen.len() > host_m.len() / 2 && differ * 1000 <= host_m.len(), "{name}: {differ} seen by one, {} by both", seen.len());
     let p99 = |of: &dyn Fn(usize) -> f32| {

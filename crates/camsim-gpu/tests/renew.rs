@@ -98,6 +98,12 @@ fn a_sequence_that_is_refused_leaves_the_session_as_it_was() {
     let mut wide = base();
     wide.scenario.camera.size_px = [engine.gpu().max_side_px() + 1, 4];
     let refused = session.renew::<Infallible>(Arc::new(wide), &COLOR).expect_err("too wide").to_string();
-    assert!(refused.contains("a side of the output frame needs") && refused.contains("reduce camera.size_px"), "{refused}");
+    // Some adapters hold as much as a scenario may ask for.
+    let expected = if engine.gpu().max_side_px() < 32_768 {
+        ["a side of the output frame needs", "reduce camera.size_px"]
+    } else {
+        ["camera.size_px is", "32768"]
+    };
+    assert!(expected.iter().all(|text| refused.contains(text)), "{refused}");
     assert_eq!(next(&mut session, 3).color_rgba, render(&engine, &good, &COLOR, 3).frame.color_rgba);
 }

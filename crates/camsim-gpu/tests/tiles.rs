@@ -11,7 +11,7 @@ use camsim_core::{
     sequence::Sequence,
 };
 use camsim_gpu::engine::IdealImages;
-use common::{engine, scenario, sequence, steady};
+use common::{engine, is_software, scenario, sequence, steady};
 use glam::DVec3;
 
 /// Every texel another colour, with larger patches: nothing hides a read that is off.
@@ -90,8 +90,10 @@ fn tiles_show_what_one_texture_does() {
                 255.0 * largest,
                 255.0 * mean
             );
-            // Half floats below 1 are up to 0.12/255 apart.
-            assert!(255.0 * largest < 0.26 && 255.0 * mean < 0.002, "{largest} {mean}");
+            // Half floats below 1 are up to 0.12/255 apart. Where texels are weighed with 8 bits, a read of black beside white is off by 1/255 at most (2^-9 of it along
+            // each axis), and the same place of a tile is not rounded as that of the whole.
+            let [most, most_mean] = if is_software(&engine()) { [0.26, 0.002] } else { [2.0, 0.1] };
+            assert!(255.0 * largest < most && 255.0 * mean < most_mean, "{largest} {mean}");
         }
         seen.push(reads);
         assert!(held < all);

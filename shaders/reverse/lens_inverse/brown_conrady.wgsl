@@ -14,12 +14,14 @@ fn denominator(r2: f32) -> f32 {
     return 1.0 + r2 * (k.x + r2 * (k.y + r2 * k.z));
 }
 
-fn distort(ideal: vec2f) -> vec2f {
+// Where the lens images a point, less where it should. Of the factor of the radius only what it has above 1 is multiplied, so that what is rounded is small.
+fn residual_of(ideal: vec2f, distorted: vec2f) -> vec2f {
     let r2 = dot(ideal, ideal);
-    let d = numerator(r2) / denominator(r2);
+    let above = lens.radial - lens.rational;
+    let grown = r2 * (above.x + r2 * (above.y + r2 * above.z)) / denominator(r2);
     let p = lens.tangential;
     let uv2 = 2.0 * ideal.x * ideal.y;
-    return ideal * d + p.xy * uv2 + p.yx * (r2 + 2.0 * ideal * ideal);
+    return (ideal - distorted) + (ideal * grown + p.xy * uv2 + p.yx * (r2 + 2.0 * ideal * ideal));
 }
 
 // a, b, c of the symmetric Jacobian [[a, b], [b, c]].
@@ -78,12 +80,12 @@ fn undistort(distorted: vec2f, start: vec2f) -> vec3f {
     if length(start) > START_SHARE_OF_FOLD * lens.fold_min {
         ideal = scaled_to(start, min(length(start), START_SHARE_OF_FOLD * fold_radius(start)));
     }
-    var residual = distort(ideal) - distorted;
+    var residual = residual_of(ideal, distorted);
     var step = newton_step(ideal, residual);
     for (var i = 0; i < MAX_STEPS; i++) {
         let last = length(step * lens.focal_px) < LAST_STEP_PX;
         let next = inside(ideal, ideal + step);
-        let next_residual = distort(next) - distorted;
+        let next_residual = residual_of(next, distorted);
         // The last step is within rounding of the solution: whether its residual grew says nothing.
         if last || dot(next_residual, next_residual) <= dot(residual, residual) {
             ideal = next;

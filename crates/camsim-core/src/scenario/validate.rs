@@ -116,7 +116,7 @@ fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
 }
 
 /// Larger pictures than this are typing errors on every adapter there is.
-pub const MAX_SIDE_PX: u32 = 65_536;
+pub const MAX_SIDE_PX: u32 = crate::camera::MAX_SIZE_PX;
 
 fn check_camera(check: &mut Check, camera: &CameraSpec) {
     check.require(camera.size_px.iter().all(|&side| (1..=MAX_SIDE_PX).contains(&side)), "camera.size_px", || {

@@ -20,9 +20,14 @@ use camsim_gpu::{
 };
 use glam::{DQuat, DVec3, EulerRot};
 
-/// The software adapter: figures compare between machines.
+/// The software adapter, so that figures compare between machines, or the one that `CAMSIM_ADAPTER` names.
 pub fn engine() -> Engine {
     Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them")
+}
+
+/// Whether textures are read and triangles drawn by code. Circuits weigh texels with 8 bits of fraction, and move corners to multiples of 1/256 px.
+pub fn is_software(engine: &Engine) -> bool {
+    engine.gpu().adapter.kind == "software"
 }
 
 /// A default scenario to change; log and scene are given in memory.
