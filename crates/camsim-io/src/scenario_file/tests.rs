@@ -137,8 +137,8 @@ fn bad_scenarios_are_named_by_file_line_and_key() {
         ("[camera]\nresolution = [640, 480]", "camera.resolution: unknown key; `camsim render --print-default`"),
         ("qqqq = 1", "unknown key; `camsim render --print-default`"),
         ("[camera]\nfps = \"thirty\"", "dir/s.toml:7: camera.fps: expected a number, found \"thirty\""),
-        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers up to 65536, found [640, -1]"),
-        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml:7: camera.size_px: expected a list of 2 whole numbers up to 65536, found"),
+        ("[camera]\nsize_px = [640, -1]", "camera.size_px: expected a list of 2 whole numbers up to 32768, found [640, -1]"),
+        ("[camera]\nsize_px = [640, 99999999999]", "dir/s.toml:7: camera.size_px: expected a list of 2 whole numbers up to 32768, found"),
         (
             "[quality]\nblur_samples = 4294967296",
             "dir/s.toml:7: quality.blur_samples: expected a whole number up to 4096 or \"auto\", found 4294967296",
