@@ -231,7 +231,11 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc
     let sun_sky = light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
     let uniform = MeshMaterial { emissive_cutoff: [r, g, b, material.cutoff.unwrap_or(0.0)], sun_sky };
     let buffer = |label, contents: &[u8], usage| {
-        gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
+        let (size, usage) = (contents.len() as u64, usage | wgpu::BufferUsages::COPY_DST);
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
+        // Mapped at creation there would be nothing to write to on a device that is lost.
+        gpu.queue.write_buffer(&buffer, 0, contents);
+        buffer
     };
     MeshBatch {
         vertices: buffer("camsim.mesh.vertices", bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),

@@ -11,8 +11,8 @@ use camsim_core::{
 use common::{engine, render, scenario, sequence, steady};
 use glam::DVec3;
 
-/// Half floats, of the picture on the device and of the ideal frame: 2^-12 of 1 each, and less of less.
-const MOST: f64 = 5e-4;
+/// Half floats: 2^-12 of 1 for the picture on the device, 2^-11 for the ideal frame, which devices may cut off; less of less.
+const MOST: f64 = 7.4e-4;
 
 /// All byte values, 16 by 16 sharp texels, on a level square with a side of 60 m.
 fn chart() -> Mesh {

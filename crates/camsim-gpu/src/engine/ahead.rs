@@ -21,8 +21,9 @@ use camsim_core::{
 use super::ms_since;
 use crate::ideal::base_ned_m;
 
-/// Frames that are prepared before they are asked for, at most, where each is planned by itself. Each is some megabytes of triangles and poses.
-const MOST_AHEAD: usize = 4;
+/// Frames that are prepared before they are asked for, at most, with as many threads. Each is some megabytes of triangles and poses where it is planned by itself; those of a group have
+/// one ideal frame's.
+const MOST_AHEAD: usize = 16;
 /// Frames of one group that one thread prepares, at most: as many are ready while as many are begun.
 const MOST_TOGETHER: usize = 16;
 
