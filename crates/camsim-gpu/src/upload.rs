@@ -231,10 +231,13 @@ fn upload_batch(gpu: &GpuContext, mesh: &Mesh, light: Option<Light>, levels: Arc
     let sun_sky = light.map_or([0.0; 4], |light| (light.sun * light.to_sun_ned).extend(light.sky).as_vec4().to_array());
     let uniform = MeshMaterial { emissive_cutoff: [r, g, b, material.cutoff.unwrap_or(0.0)], sun_sky };
     let buffer = |label, contents: &[u8], usage| {
-        let (size, usage) = (contents.len() as u64, usage | wgpu::BufferUsages::COPY_DST);
-        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false });
-        // Mapped at creation there would be nothing to write to on a device that is lost.
-        gpu.queue.write_buffer(&buffer, 0, contents);
+        let size = contents.len() as u64;
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: true });
+        // On a device that is lost there is nothing to write to; it says so itself.
+        if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
+            range.copy_from_slice(contents);
+        }
+        buffer.unmap();
         buffer
     };
     MeshBatch {
