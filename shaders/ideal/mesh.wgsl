@@ -15,6 +15,6 @@ struct MeshSurface {
 }
 
 @fragment
-fn fragment(in: MeshSurface) -> @location(0) vec4<f32> {
-    return mesh_color(in.uv, in.tint, in.in_camera_m);
+fn fragment(in: MeshSurface, @builtin(sample_mask) mask: u32) -> @location(0) vec4<f32> {
+    return mesh_color(in.uv, covered_uv(in.uv, mask), in.tint, in.in_camera_m);
 }

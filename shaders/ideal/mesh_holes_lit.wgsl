@@ -21,7 +21,7 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) position_m: vec3<
 
 @fragment
 fn fragment(in: LitHoledSurface, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-    let color = mesh_color(in.uv, lit(in.tint, in.normal_ned, is_front), in.in_camera_m);
+    let color = mesh_color(in.uv, in.uv, lit(in.tint, in.normal_ned, is_front), in.in_camera_m);
     if (is_hole(in.sample_uv, in.sample_alpha)) {
         discard;
     }

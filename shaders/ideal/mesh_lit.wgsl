@@ -16,6 +16,6 @@ fn vertex(@builtin(instance_index) instance: u32, @location(0) position_m: vec3<
 }
 
 @fragment
-fn fragment(in: LitSurface, @builtin(front_facing) is_front: bool) -> @location(0) vec4<f32> {
-    return mesh_color(in.uv, lit(in.tint, in.normal_ned, is_front), in.in_camera_m);
+fn fragment(in: LitSurface, @builtin(front_facing) is_front: bool, @builtin(sample_mask) mask: u32) -> @location(0) vec4<f32> {
+    return mesh_color(in.uv, covered_uv(in.uv, mask), lit(in.tint, in.normal_ned, is_front), in.in_camera_m);
 }

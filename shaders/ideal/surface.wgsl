@@ -3,7 +3,7 @@
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
-    // At a place that the triangle covers: beyond its border a steep triangle's texture would run far.
+    // At the pixel's middle.
     @location(0) uv: vec2<f32>,
     @location(1) in_camera_m: vec3<f32>,
 }
@@ -14,7 +14,10 @@ fn project_surface(from_base_m: vec3<f32>, uv: vec2<f32>) -> Surface {
     return Surface(ideal_clip(p), uv, p);
 }
 
-// What reads the picture: the `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
+// Where a pixel's triangle is, of which its middle may be outside: the `covered` slot.
+#import <slot:covered>
+
+// What reads the picture about a place, of which the middle's neighbours tell how large a pixel is: the `reads` slot, with as many reads as the picture's error asks for. Own code, because adapters' anisotropic
 // filters are each their own approximation. Twin: camsim_core::plan::transfer::SurfaceFilter.
 // Where the picture is: the `picture` slot, in one texture or in tiles.
 #import <slot:picture>

@@ -9,6 +9,6 @@ fn vertex(@builtin(vertex_index) index: u32) -> Surface {
 }
 
 @fragment
-fn fragment(in: Surface) -> @location(0) vec4<f32> {
-    return in_fog(picture_at(in.uv), in.in_camera_m);
+fn fragment(in: Surface, @builtin(sample_mask) mask: u32) -> @location(0) vec4<f32> {
+    return in_fog(picture_at(in.uv, covered_uv(in.uv, mask)), in.in_camera_m);
 }

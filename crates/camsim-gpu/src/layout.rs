@@ -234,7 +234,7 @@ mod tests {
                 pad2,
             ]
         );
-        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, false, true);
+        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, 1, false, true);
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);

@@ -19,6 +19,8 @@ embedded![
     "common/noise.wgsl",
     "ideal/borders.wgsl",
     "ideal/camera.wgsl",
+    "ideal/covered/samples.wgsl",
+    "ideal/covered/whole.wgsl",
     "ideal/fine.wgsl",
     "ideal/fog/none.wgsl",
     "ideal/fog/some.wgsl",

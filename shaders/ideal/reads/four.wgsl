@@ -4,7 +4,7 @@
 // Longer by this than wide (at least a texel), and one read across is enough.
 const IN_A_ROW: f32 = 1.6;
 
-fn picture_at(uv: vec2<f32>) -> Texel {
+fn picture_at(uv: vec2<f32>, at: vec2<f32>) -> Texel {
     let pixel = pixel_at(uv);
     let square = pixel.longer < IN_A_ROW * max(pixel.shorter, 1.0);
     let version = version_for(select(max(0.25 * pixel.longer, pixel.shorter), 0.5 * pixel.longer, square));
@@ -15,7 +15,7 @@ fn picture_at(uv: vec2<f32>) -> Texel {
     let b = vec2<f32>(-pixel.along.y, pixel.along.x) * sqrt(short2) / pixel.size;
     let first = select(3.0 * a, a + b, square);
     let second = select(a, a - b, square);
-    let sum = picture_read(uv + first, version.level) + picture_read(uv - first, version.level)
-        + picture_read(uv + second, version.level) + picture_read(uv - second, version.level);
+    let sum = picture_read(at + first, version.level) + picture_read(at - first, version.level)
+        + picture_read(at + second, version.level) + picture_read(at - second, version.level);
     return 0.25 * sum;
 }

@@ -19,7 +19,7 @@ fn tap_length(side: f32, taps: f32, version: f32) -> f32 {
     return sqrt(max(side * side - version, 0.0) / max(1.0 - 1.0 / (taps * taps), 0.5));
 }
 
-fn picture_at(uv: vec2<f32>) -> Texel {
+fn picture_at(uv: vec2<f32>, middle: vec2<f32>) -> Texel {
     let pixel = pixel_at(uv);
     // What a read covers, texels; a direction in which a texel is two pixels wide needs no more than one.
     let short_taps = select(1.0, SHORT_TAPS, pixel.shorter > ONE_TAP);
@@ -35,7 +35,7 @@ fn picture_at(uv: vec2<f32>) -> Texel {
     // Back to the first of the next row.
     let row_step = short_axis / short_taps - (long_taps - 1.0) * long_step;
     let taps = long_taps * short_taps;
-    var at = uv - 0.5 * (long_axis - long_step) - 0.5 * (1.0 - 1.0 / short_taps) * short_axis;
+    var at = middle - 0.5 * (long_axis - long_step) - 0.5 * (1.0 - 1.0 / short_taps) * short_axis;
     var sum = Texel();
     // One loop: llvmpipe pays as much for a second one as for a read.
     for (var i = 1.0; i <= taps; i += 1.0) {

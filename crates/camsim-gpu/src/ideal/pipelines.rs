@@ -35,18 +35,22 @@ fn fog_slot(has_fog: bool) -> Slot {
     ("fog", if has_fog { "ideal/fog/some.wgsl" } else { "ideal/fog/none.wgsl" })
 }
 
-/// What fills the slots of the ground.
-pub(crate) fn ground_slots(reads: SurfaceReads, has_tiles: bool, has_fog: bool) -> [Slot; 3] {
-    [reads_slot(reads), picture_slot(has_tiles), fog_slot(has_fog)]
+fn covered_slot(samples: u32) -> Slot {
+    ("covered", if samples > 1 { "ideal/covered/samples.wgsl" } else { "ideal/covered/whole.wgsl" })
+}
+
+/// What fills the slots of the ground. It goes on beyond its triangles: reads in the middles of their parts would only blur it.
+pub(crate) fn ground_slots(reads: SurfaceReads, has_tiles: bool, has_fog: bool) -> [Slot; 4] {
+    [reads_slot(reads), covered_slot(1), picture_slot(has_tiles), fog_slot(has_fog)]
 }
 
 /// What fills the slots of a mesh.
-pub(crate) fn mesh_slots(reads: SurfaceReads, mixed: bool, has_fog: bool) -> [Slot; 4] {
+pub(crate) fn mesh_slots(reads: SurfaceReads, samples: u32, mixed: bool, has_fog: bool) -> [Slot; 5] {
     let (picture, color) = match mixed {
         false => (picture_slot(false), ("mesh_color", "ideal/mesh_color/whole.wgsl")),
         true => (("picture", "ideal/picture/mixed.wgsl"), ("mesh_color", "ideal/mesh_color/mixed.wgsl")),
     };
-    [reads_slot(reads), picture, color, fog_slot(has_fog)]
+    [reads_slot(reads), covered_slot(samples), picture, color, fog_slot(has_fog)]
 }
 
 /// Which pipelines draw surfaces.
@@ -106,7 +110,7 @@ impl IdealPass {
             let drawing = Drawing { one_sided: kind.one_sided, holes: kind.holes, ..on_ground };
             let vertices = [Some(mesh_vertices.clone()), Some(mesh_normals.clone())];
             let all = if kind.lit { &vertices[..] } else { &vertices[..1] };
-            let slots = mesh_slots(reads, false, self.has_fog);
+            let slots = mesh_slots(reads, samples, false, self.has_fog);
             if !kind.blends {
                 meshes.insert(*kind, pipeline(gpu, kind.shader(), &slots, &layouts, all, drawing)?);
                 continue;
@@ -115,7 +119,7 @@ impl IdealPass {
             meshes.insert(*kind, pipeline(gpu, "ideal/mesh_holes.wgsl", &slots, &layouts, &vertices[..1], depth)?);
             if format.is_some() {
                 let mixed = Drawing { writes: Writes::Mixed, ..drawing };
-                layers.insert(*kind, pipeline(gpu, kind.shader(), &mesh_slots(reads, true, self.has_fog), &layouts, all, mixed)?);
+                layers.insert(*kind, pipeline(gpu, kind.shader(), &mesh_slots(reads, samples, true, self.has_fog), &layouts, all, mixed)?);
             }
         }
         Ok(SurfacePipelines { terrain, meshes, layers })

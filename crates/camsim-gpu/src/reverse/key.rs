@@ -384,12 +384,14 @@ mod tests {
         ];
         let mixed = [("ideal/mesh.wgsl", true), ("ideal/mesh_lit.wgsl", true)];
         let surfaces = surfaces.into_iter().chain(mixed).flat_map(|(file, other)| {
-            SurfaceReads::ALL.map(|reads| {
-                // Of the ground in tiles and on a clear day, of meshes mixed and in fog.
-                let on_ground = crate::ideal::ground_slots(reads, other, !other);
-                let on_mesh = crate::ideal::mesh_slots(reads, other, other);
-                let slots = if file == "ideal/terrain.wgsl" { &on_ground[..] } else { &on_mesh };
-                (format!("{file} {reads:?} {other}"), shaders::compose(file, slots).unwrap())
+            SurfaceReads::ALL.into_iter().flat_map(move |reads| {
+                [1, 4].map(|samples| {
+                    // Of the ground in tiles and on a clear day, of meshes mixed and in fog.
+                    let on_ground = crate::ideal::ground_slots(reads, other, !other);
+                    let on_mesh = crate::ideal::mesh_slots(reads, samples, other, other);
+                    let slots = if file == "ideal/terrain.wgsl" { &on_ground[..] } else { &on_mesh };
+                    (format!("{file} {reads:?} {samples} {other}"), shaders::compose(file, slots).unwrap())
+                })
             })
         });
         let marks = [false, true].map(|thin| {
