@@ -231,7 +231,7 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     let picture = terrain.texture.rgba8.len() as u64;
     let heights_on_host = terrain.host_bytes();
     if scene::is_whole(terrain.texture.size_px, MAX_SIDE_PX) {
-        return Some(Memory { heights_on_host, picture_on_host: picture, picture_on_device: 4 * picture / 3, tiles: None });
+        return Some(Memory { heights_on_host, picture_on_host: picture, picture_on_device: 8 * picture / 3, tiles: None });
     }
     let ground = GroundTiles::new(terrain);
     let tiles = detail(terrain, plan).tiles(&ground, plan.surface_reads).len() as u64;
@@ -239,7 +239,7 @@ fn memory(sequence: &Sequence, plan: &FramePlan) -> Option<Memory> {
     Some(Memory {
         heights_on_host,
         picture_on_host: 4 * picture / 3,
-        picture_on_device: tiles * tile_bytes(TexelForm::Stored),
+        picture_on_device: tiles * tile_bytes(TexelForm::Light),
         tiles: Some([tiles, all]),
     })
 }
@@ -250,9 +250,9 @@ fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>)
     console.line(format_args!("  host: {heights:.1} MiB of heights, {picture:.1} MiB of picture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
     match memory.tiles {
-        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB (twice that on a software adapter)"))?,
+        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB"))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 16 MiB; twice all that on a software adapter)"
+            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 32 MiB)"
         ))?,
     }
     Ok(())
