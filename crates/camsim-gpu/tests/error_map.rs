@@ -122,7 +122,7 @@ fn as_many_threads_as_there_are_leave_each_other_free() {
     let (done, is_done) = std::sync::mpsc::channel();
     let work = move || {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(16).build().expect("threads");
-        // A pan during a long exposure over things of many depths asks what look-ups find at mid-exposure.
+        // Over hills, in a turn: such plans ask what look-ups find at mid-exposure.
         let sequence = flown(camera(), hills());
         for _ in 0..20 {
             pool.install(|| mapped(&sequence, 3));
