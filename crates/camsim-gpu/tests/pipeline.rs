@@ -133,6 +133,34 @@ struct Full(u64);
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn any_number_of_threads_makes_the_same_frames() {
+    let frames_of = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let engine = engine();
+            let mut session = engine.session::<Infallible>(houses(), &[Channel::Color, Channel::Depth]).expect("session");
+            let mut frames = Vec::new();
+            let mut keep = |Finished { frame, plan, .. }: Finished| {
+                let plan = format!("{plan:?}");
+                frames.push((frame.index, frame.color_rgba, frame.depth_m, plan));
+                Ok(())
+            };
+            session.render::<Infallible>(0..12, &mut keep).expect("render");
+            frames
+        })
+    };
+    let by_one = frames_of(1);
+    for threads in [2, 16] {
+        let by_many = frames_of(threads);
+        assert_eq!(by_many.len(), by_one.len());
+        for (one, many) in by_one.iter().zip(&by_many) {
+            assert!(one == many, "frame {}, which is otherwise by {threads} threads", one.0);
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn the_first_fault_stops_everything_and_the_session_goes_on() {
     let engine = engine();
     let sequence = plain(false);
