@@ -74,7 +74,14 @@ impl<'a> Candidates<'a> {
             let scenery = look.scenery();
             Some((look, scenery))
         };
-        let (look, scenery) = place.get_or_init(see).as_ref()?;
+        let seen = if let Some(seen) = place.get() {
+            seen
+        } else {
+            // Looking is parallel in itself: nobody waits for it, as whoever does may have a part of it to do.
+            let seen = see();
+            place.get_or_init(|| seen)
+        };
+        let (look, scenery) = seen.as_ref()?;
         let scale = given.map_or(FINEST_SCALE, |sampling| sampling.scale);
         scenery.may_be_shared(&self.planner.sequence.scenario.quality, scale).then(|| (look.clone(), scenery))
     }
