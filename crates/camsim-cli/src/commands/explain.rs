@@ -250,9 +250,9 @@ fn print_memory(memory: &Memory, triangle_bytes: u64, console: &mut Console<'_>)
     console.line(format_args!("  host: {heights:.1} MiB of heights, {picture:.1} MiB of picture"))?;
     let (triangles, picture) = (mib(triangle_bytes), mib(memory.picture_on_device));
     match memory.tiles {
-        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB"))?,
+        None => console.line(format_args!("  device: {triangles:.1} MiB of triangles, the picture whole in {picture:.1} MiB, where the device draws it"))?,
         Some([tiles, all]) => console.line(format_args!(
-            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 32 MiB)"
+            "  device: {triangles:.1} MiB of triangles, {tiles} of {all} tiles of the picture in {picture:.1} MiB (at most twice of what any frame needs, and 32 MiB), where the device draws it"
         ))?,
     }
     Ok(())
