@@ -199,7 +199,7 @@ impl HostScene {
         for round in 0..jobs.len().div_ceil(CHUNKS_A_ROUND).max(1) {
             let first = round * CHUNKS_A_ROUND;
             let jobs = &jobs[first..jobs.len().min(first + CHUNKS_A_ROUND)];
-            self.collect(drawing, jobs);
+            self.collect(drawing, jobs, |_| {});
             self.fill(places, camera, view.plan, jobs.len(), round > 0, into);
         }
     }
@@ -216,10 +216,13 @@ impl HostScene {
         }
         self.shown.fit(into.depth.len());
         self.project_terrain(camera, view.terrain);
-        self.collect(drawing, jobs);
+        let mut sampled = std::mem::take(&mut self.sampled);
+        sampled.clear(camera.size_px);
+        self.collect(drawing, jobs, |chunk| sampled.mark(chunk));
         let chunks = &self.chunks[..jobs.len()];
         let shader = Shader { camera, chunks, paints: &self.paints, reads: view.plan.surface_reads, a_pixel: ALONG as f32, is_over: false };
-        self.sampled.fill(&shader, &mut self.shown, into);
+        sampled.fill(&shader, &mut self.shown, into);
+        self.sampled = sampled;
     }
 
     fn add_parts(&self, drawn: &[Vec<Range<u32>>], parts: &mut Vec<(Part, usize)>) {
@@ -249,8 +252,8 @@ impl HostScene {
         });
     }
 
-    /// Triangles of all jobs, and which bands they are in.
-    fn collect(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>]) {
+    /// Triangles of all jobs, and which bands they are in; each chunk of them is shown as soon as they are there.
+    fn collect(&mut self, drawing: &Drawing<'_>, jobs: &[Vec<Part>], show: impl Fn(&Chunk) + Sync) {
         let bands = (drawing.camera.size_px[1] as usize).div_ceil(BAND_ROWS);
         let mut chunks = std::mem::take(&mut self.chunks);
         if chunks.len() < jobs.len() {
@@ -260,6 +263,7 @@ impl HostScene {
             chunk.clear();
             chunk.is_of_ground = matches!(job.first(), Some(Part::Terrain(_)));
             self.triangles_of(drawing, job, chunk);
+            show(chunk);
             chunk.sort(bands);
         });
         self.chunks = chunks;
@@ -319,7 +323,7 @@ impl HostScene {
 #[inline(always)]
 fn fill_band(vectors: impl Vectors, places: impl Places, shader: &Shader<'_>, mut band: Band<'_>, color: &mut [u16]) {
     for (number, chunk) in (0..).zip(shader.chunks) {
-        band.draw(places, chunk, number, |_| true);
+        band.draw(vectors, places, chunk, number, |_| true);
     }
     let width = shader.camera.size_px[0] as usize;
     let rows = band.shown.chunks_exact(band.stride).zip(color.chunks_exact_mut(CHANNELS * band.stride));

@@ -1,16 +1,15 @@
 //! Which triangle each pixel shows, and how far it is.
 
-use std::ops::RangeInclusive;
+use std::ops::Range;
 
 use super::{
     corners::SUBPIXELS,
     triangles::{BAND_ROWS, Chunk, Cover},
 };
+use crate::host::vectors::{Numbers, SIDE_BY_SIDE, Shown, Vectors, Wholes};
 
 /// What a pixel shows where it shows no triangle.
 pub(super) const SKY: u32 = u32::MAX;
-/// Pixels that are looked at together.
-const SIDE_BY_SIDE: usize = 8;
 /// Room beyond the last pixel of a row.
 pub(super) const BEYOND: usize = SIDE_BY_SIDE;
 /// Up to this size of a triangle, pixels, products of differences are exact in 32 bits, eight pixels beyond its end too.
@@ -37,8 +36,26 @@ pub(super) trait Places: Copy + Send + Sync {
     /// Columns after which places are as high again.
     const ALIKE: usize;
 
-    /// Quarters of a pixel from a pixel's middle to the right, by the row, and down, by the column; of pixels that are further apart, from the first one's.
-    fn beside(column: usize, row: usize) -> [i32; 2];
+    /// Quarters of a pixel from a pixel's middle to the right, in even rows and odd ones, and down, in even columns and odd ones; of pixels that are further apart, from the first one's.
+    const RIGHT: [i32; 2];
+    const DOWN: [i32; 2];
+
+    /// Quarters of a pixel from the first of places side by side to each, to the right; and from the middle of its pixel down, where the first one is in an even column and in an odd one.
+    const STEPS: Wholes = steps(Self::STEP);
+    const DOWNS: [Wholes; 2] = [alternating(Self::DOWN[0], Self::DOWN[1]), alternating(Self::DOWN[1], Self::DOWN[0])];
+
+    fn beside(column: usize, row: usize) -> [i32; 2] {
+        [Self::RIGHT[row % 2], Self::DOWN[column % 2]]
+    }
+}
+
+const fn steps(step: usize) -> Wholes {
+    let quarters = 4 * step as i32;
+    [0, quarters, 2 * quarters, 3 * quarters, 4 * quarters, 5 * quarters, 6 * quarters, 7 * quarters]
+}
+
+const fn alternating(a: i32, b: i32) -> Wholes {
+    [a, b, a, b, a, b, a, b]
 }
 
 /// At the middles of the pixels that triangles are on.
@@ -57,31 +74,22 @@ pub(super) struct Samples;
 impl Places for Pixels {
     const STEP: usize = 1;
     const ALIKE: usize = 1;
-
-    #[inline(always)]
-    fn beside(_: usize, _: usize) -> [i32; 2] {
-        [0; 2]
-    }
+    const RIGHT: [i32; 2] = [0; 2];
+    const DOWN: [i32; 2] = [0; 2];
 }
 
 impl Places for Fours {
     const STEP: usize = 2;
     const ALIKE: usize = 1;
-
-    #[inline(always)]
-    fn beside(_: usize, _: usize) -> [i32; 2] {
-        [2; 2]
-    }
+    const RIGHT: [i32; 2] = [2; 2];
+    const DOWN: [i32; 2] = [2; 2];
 }
 
 impl Places for Samples {
     const STEP: usize = 1;
     const ALIKE: usize = 2;
-
-    #[inline(always)]
-    fn beside(column: usize, row: usize) -> [i32; 2] {
-        [1 - 2 * (row as i32 & 1), 2 * (column as i32 & 1) - 1]
-    }
+    const RIGHT: [i32; 2] = [1, -1];
+    const DOWN: [i32; 2] = [-1, 1];
 }
 
 /// `a x + b y + c` of places in quarters of a pixel, at least 0 within a triangle.
@@ -104,7 +112,7 @@ fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output =
 
 /// Where a triangle is in a band.
 struct Within {
-    rows: RangeInclusive<usize>,
+    rows: Range<usize>,
     /// First and last columns.
     columns: [usize; 2],
     /// Quarters of a pixel from the triangle's first one to the first column.
@@ -114,7 +122,7 @@ struct Within {
 impl Band<'_> {
     /// Draws a chunk's triangles that are wanted.
     #[inline(always)]
-    pub fn draw<P: Places>(&mut self, _: P, chunk: &Chunk, number: u32, mut is_wanted: impl FnMut(&Cover) -> bool) {
+    pub fn draw<P: Places>(&mut self, vectors: impl Vectors, _: P, chunk: &Chunk, number: u32, mut is_wanted: impl FnMut(&Cover) -> bool) {
         for &triangle in chunk.of_band(self.number) {
             let cover = &chunk.covers[triangle as usize];
             if !is_wanted(cover) {
@@ -122,7 +130,7 @@ impl Band<'_> {
             }
             let name = number << CHUNK_BITS | triangle;
             match chunk.large.get(cover.large as usize) {
-                None => self.small::<P>(cover, name),
+                None => self.small::<P>(vectors, cover, name),
                 Some([inverse, ..]) => (0..P::ALIKE).for_each(|first| self.large::<P>(cover, inverse, name, first)),
             }
         }
@@ -134,14 +142,15 @@ impl Band<'_> {
 
     #[inline(always)]
     fn within<P: Places>(&self, cover: &Cover) -> Within {
-        let [first, last] = [cover.first, cover.last].map(|of| of.map(|of| usize::from(of) / P::STEP));
+        let place = |[x, y]: [u16; 2]| [usize::from(x) / P::STEP, usize::from(y) / P::STEP];
+        let (first, last) = (place(cover.first), place(cover.last));
         let first_row = self.first_row::<P>();
         let right = 4 * ((P::STEP * first[0]) as i32 - i32::from(cover.first[0]));
-        Within { rows: first[1].max(first_row)..=last[1].min(first_row + BAND_ROWS / P::STEP - 1), columns: [first[0], last[0]], right }
+        Within { rows: first[1].max(first_row)..(last[1] + 1).min(first_row + BAND_ROWS / P::STEP), columns: [first[0], last[0]], right }
     }
 
     #[inline(always)]
-    fn small<P: Places>(&mut self, cover: &Cover, name: u32) {
+    fn small<P: Places>(&mut self, vectors: impl Vectors, cover: &Cover, name: u32) {
         let [a, b, c] = cover.at;
         let sides: [Side<i32>; 3] = [side(a, b), side(b, c), side(c, a)];
         let Within { rows, columns: [first, last], right } = self.within::<P>(cover);
@@ -149,18 +158,14 @@ impl Band<'_> {
         let step = 4 * P::STEP as i32;
         let inverse = [cover.inverse[0], 0.25 * cover.inverse[1], 0.25 * cover.inverse[2]];
         // What each of the pixels side by side adds.
-        let (mut adds, mut adds_inverse) = ([[0; SIDE_BY_SIDE]; 3], [0.0; SIDE_BY_SIDE]);
-        for i in 0..SIDE_BY_SIDE {
-            let [_, down] = P::beside(first + i, 0);
-            adds_inverse[i] = inverse[1] * (step * i as i32) as f32 + inverse[2] * down as f32;
-            for k in 0..3 {
-                adds[k][i] = sides[k].across * (step * i as i32) + sides[k].down * down;
-            }
-        }
+        let (steps, downs) = (&P::STEPS, &P::DOWNS[first % 2]);
+        // Written out, here and below: what `map` calls may be compiled without these vectors.
+        let of_side = |k: usize| vectors.mixed([sides[k].across, sides[k].down], [steps, downs]);
+        let adds = [of_side(0), of_side(1), of_side(2)];
+        let adds_inverse = vectors.mixed_numbers([inverse[1], inverse[2]], [&numbers(steps), &numbers(downs)]);
         let first_row = self.first_row::<P>();
         for y in rows {
-            let [beside, _] = P::beside(0, y);
-            let right = right + beside;
+            let right = right + P::RIGHT[y % 2];
             let down = 4 * ((P::STEP * y) as i32 - i32::from(cover.first[1]));
             let mut begins = [0; 3];
             for k in 0..3 {
@@ -168,26 +173,22 @@ impl Band<'_> {
             }
             let begin_inverse = inverse[2].mul_add(down as f32, inverse[1].mul_add(right as f32, inverse[0]));
             let row = (y - first_row) * self.stride + first;
-            for x in (0..=last).step_by(SIDE_BY_SIDE) {
+            let mut x = 0;
+            while x <= last {
                 let far = step * x;
-                let from = [begins[0] + sides[0].across * far, begins[1] + sides[1].across * far, begins[2] + sides[2].across * far];
-                let from_inverse = inverse[1].mul_add(far as f32, begin_inverse);
                 let place = row + x as usize;
                 // Rows have more numbers than pixels, so that there are enough.
                 let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else { return };
-                for i in 0..SIDE_BY_SIDE {
-                    // Bits of what is less than 0 anywhere.
-                    let beyond = (from[0] + adds[0][i]) | (from[1] + adds[1][i]) | (from[2] + adds[2][i]) | (last - x - i as i32);
-                    let here = from_inverse + adds_inverse[i];
-                    let is_seen = (beyond >= 0) & (here > depth[i]);
-                    depth[i] = if is_seen { here } else { depth[i] };
-                    shown[i] = if is_seen { name } else { shown[i] };
-                }
+                let inside = |k: usize| (begins[k] + sides[k].across * far, &adds[k]);
+                let near = (inverse[1].mul_add(far as f32, begin_inverse), &adds_inverse);
+                vectors.show(&Shown { name, inside: [inside(0), inside(1), inside(2)], last: last - x, near }, depth, shown);
+                x += SIDE_BY_SIDE as i32;
             }
         }
     }
 
     /// By spans, whose ends are exact in 64 bits: of columns that are alike, from the triangle's first one or one beside it on.
+    #[inline(always)]
     fn large<P: Places>(&mut self, cover: &Cover, inverse: &[f64; 3], name: u32, begin: usize) {
         let [a, b, c] = cover.at;
         let sides: [Side<i64>; 3] = [side(a, b), side(b, c), side(c, a)];
@@ -226,6 +227,15 @@ impl Band<'_> {
             }
         }
     }
+}
+
+#[inline(always)]
+fn numbers(wholes: &Wholes) -> Numbers {
+    let mut numbers = [0.0; SIDE_BY_SIDE];
+    for i in 0..SIDE_BY_SIDE {
+        numbers[i] = wholes[i] as f32;
+    }
+    numbers
 }
 
 /// Numbers side by side.

@@ -1,7 +1,10 @@
 //! Which parts of an ideal frame are drawn with several samples a pixel: tiles with a step of depth between their pixels or beside them, and those with any triangle of a model, which
 //! may be thinner than a pixel. Everywhere else samples would show what the pixel's middle shows.
 
-use std::ops::RangeInclusive;
+use std::{
+    ops::RangeInclusive,
+    sync::atomic::{AtomicU64, Ordering},
+};
 
 use rayon::prelude::*;
 
@@ -28,14 +31,14 @@ pub(super) struct Marks {
     size_px: [usize; 2],
     /// Numbers of a row of tiles.
     words: usize,
-    bits: Vec<u64>,
+    bits: Vec<AtomicU64>,
 }
 
 /// Those of a band.
 #[derive(Clone, Copy)]
 pub(super) struct OfBand<'a> {
     words: usize,
-    bits: &'a [u64],
+    bits: &'a [AtomicU64],
     /// Its first row of tiles.
     first_row: usize,
 }
@@ -46,17 +49,26 @@ impl Marks {
         self.size_px = size_px;
         self.words = size_px[0].div_ceil(TILE_PX * BITS);
         self.bits.clear();
-        self.bits.resize(self.words * TILE_ROWS * size_px[1].div_ceil(PIXEL_ROWS), 0);
-    }
-
-    /// Of each band, in their order.
-    pub fn bands_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [u64]> {
-        self.bits.par_chunks_mut(self.words * TILE_ROWS)
+        self.bits.resize_with(self.words * TILE_ROWS * size_px[1].div_ceil(PIXEL_ROWS), AtomicU64::default);
     }
 
     pub fn of_band(&self, number: usize) -> OfBand<'_> {
         let of = self.words * TILE_ROWS;
         OfBand { words: self.words, bits: &self.bits[number * of..][..of], first_row: number * TILE_ROWS }
+    }
+
+    /// Adds all tiles that triangles may be in.
+    pub fn add_triangles(&self, covers: &[Cover]) {
+        for cover in covers {
+            let [columns, rows] = tiles(cover);
+            for (row, column) in (rows[0]..=rows[1]).flat_map(|row| (columns[0]..=columns[1]).map(move |column| (row, column))) {
+                let (bits, bit) = (&self.bits[row * self.words + column / BITS], 1 << (column % BITS));
+                // Most are there: another thread need not be told again.
+                if bits.load(Ordering::Relaxed) & bit == 0 {
+                    bits.fetch_or(bit, Ordering::Relaxed);
+                }
+            }
+        }
     }
 
     /// Adds tiles in which depth has a step.
@@ -84,7 +96,7 @@ fn steps_of_rows(rows: RangeInclusive<usize>, depth: &[f32], stride: usize, [wid
 }
 
 /// Marks tiles that have one of these pixels, or are beside one.
-fn add_tiles(pixels: &[u32], marks: &mut [u64]) {
+fn add_tiles(pixels: &[u32], marks: &mut [AtomicU64]) {
     const { assert!(LANES == u32::BITS as usize && LANES.is_multiple_of(TILE_PX)) };
     let of = |block: Option<usize>| block.and_then(|block| pixels.get(block)).copied().unwrap_or(0);
     for (block, &here) in pixels.iter().enumerate() {
@@ -93,7 +105,7 @@ fn add_tiles(pixels: &[u32], marks: &mut [u64]) {
         for tile in 0..LANES / TILE_PX {
             let is_marked = beside >> (tile * TILE_PX) & ((1 << TILE_PX) - 1) != 0;
             let column = block * (LANES / TILE_PX) + tile;
-            marks[column / BITS] |= u64::from(is_marked) << (column % BITS);
+            *marks[column / BITS].get_mut() |= u64::from(is_marked) << (column % BITS);
         }
     }
 }
@@ -114,7 +126,7 @@ fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
             // Beyond the frame is what is at its border.
             let at = |row: &[f32], x: usize| row[x.min(width - 1)];
             across = std::array::from_fn(|i| at(here, (first + i).saturating_sub(1)));
-            down = [above, below].map(|row| std::array::from_fn(|i| at(row, first + i)));
+            down = [std::array::from_fn(|i| at(above, first + i)), std::array::from_fn(|i| at(below, first + i))];
         }
         let mut found = 0;
         for i in 0..LANES {
@@ -127,25 +139,16 @@ fn add_steps_of_row([above, here, below]: [&[f32]; 3], steps: &mut [u32]) {
 }
 
 /// Tiles of a triangle: first and last columns, and rows.
+#[inline(always)]
 fn tiles(cover: &Cover) -> [[usize; 2]; 2] {
-    [0, 1].map(|k| [cover.first[k], cover.last[k]].map(|of| usize::from(of) / (TILE_PX * ALONG)))
-}
-
-/// Marks all tiles of a band that a triangle may be in.
-pub(super) fn add_triangle(marks: &mut [u64], number: usize, cover: &Cover) {
-    let words = marks.len() / TILE_ROWS;
-    let [columns, rows] = tiles(cover);
-    let first_row = number * TILE_ROWS;
-    for row in rows[0].max(first_row)..=rows[1].min(first_row + TILE_ROWS - 1) {
-        for column in columns[0]..=columns[1] {
-            marks[(row - first_row) * words + column / BITS] |= 1 << (column % BITS);
-        }
-    }
+    // Written out: what `map` calls may be compiled without the vectors that this is.
+    let of = |k: usize| [usize::from(cover.first[k]) / (TILE_PX * ALONG), usize::from(cover.last[k]) / (TILE_PX * ALONG)];
+    [of(0), of(1)]
 }
 
 impl OfBand<'_> {
     pub fn is_empty(&self) -> bool {
-        self.bits.iter().all(|&bits| bits == 0)
+        self.bits.iter().all(|bits| bits.load(Ordering::Relaxed) == 0)
     }
 
     /// Whether a triangle may be in any of them.
@@ -160,7 +163,7 @@ impl OfBand<'_> {
     /// By the tile's column and its row within the band.
     #[inline(always)]
     pub fn is_marked_at(&self, column: usize, row: usize) -> bool {
-        self.bits[row * self.words + column / BITS] >> (column % BITS) & 1 == 1
+        self.bits[row * self.words + column / BITS].load(Ordering::Relaxed) >> (column % BITS) & 1 == 1
     }
 }
 

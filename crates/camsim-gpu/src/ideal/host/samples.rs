@@ -11,9 +11,9 @@ use rayon::prelude::*;
 use super::{
     CHANNELS, DrawnFrame, GROUND,
     cover::{self, BEYOND, Band, Fours, SKY},
-    marks::{Marks, OfBand, TILE_PX, add_triangle},
+    marks::{Marks, OfBand, TILE_PX},
     shade::{Block, Planes, Shader},
-    triangles::BAND_ROWS,
+    triangles::{BAND_ROWS, Chunk},
 };
 use crate::host::{
     lanes::{LANES, Lanes2, ZERO, each},
@@ -64,17 +64,28 @@ struct Part {
 type Four<T> = [T; SAMPLES];
 
 impl Sampled {
+    /// Begins a frame of so many samples: nothing is marked yet.
+    pub fn clear(&mut self, samples_px: [u32; 2]) {
+        self.marks.clear(samples_px.map(|side| side as usize / ALONG));
+    }
+
+    /// Has all that triangles of models may cover looked at by samples: they may be thinner than a pixel.
+    pub fn mark(&self, chunk: &Chunk) {
+        if !chunk.is_of_ground {
+            self.marks.add_triangles(&chunk.covers);
+        }
+    }
+
     /// Depth and colour of every pixel.
     pub fn fill(&mut self, shader: &Shader<'_>, shown: &mut Large<u32>, into: &mut DrawnFrame) {
         let stride = into.stride;
         let of_band = stride * PIXEL_ROWS;
-        self.marks.clear(shader.camera.size_px.map(|side| side as usize / ALONG));
-        let bands = into.depth.par_chunks_mut(of_band).zip(shown.par_chunks_mut(of_band)).zip(self.marks.bands_mut());
-        bands.enumerate().for_each(|(number, ((depth, shown), marks))| {
+        let bands = into.depth.par_chunks_mut(of_band).zip(shown.par_chunks_mut(of_band));
+        bands.enumerate().for_each(|(number, (depth, shown))| {
             depth.fill(0.0);
             shown.fill(SKY);
             let mut band = Band { number, stride, depth, shown };
-            widest!(_vectors => draw_middles(shader, &mut band, marks))
+            widest!(vectors => draw_middles(vectors, shader, &mut band))
         });
         self.marks.add_steps(&into.depth, stride);
         self.bands.resize_with(rayon::current_num_threads(), Mutex::default);
@@ -90,16 +101,11 @@ impl Sampled {
     }
 }
 
-/// What of the ground the middles of pixels show. Tiles of models are marked: their samples tell all.
+/// What of the ground the middles of pixels show; where models are their samples tell all.
 #[inline(always)]
-fn draw_middles(shader: &Shader<'_>, band: &mut Band<'_>, marks: &mut [u64]) {
-    for (number, chunk) in (0..).zip(shader.chunks) {
-        if chunk.is_of_ground {
-            band.draw(Fours, chunk, number, |_| true);
-        } else {
-            let of_band = chunk.of_band(band.number).iter().map(|&triangle| &chunk.covers[triangle as usize]);
-            of_band.for_each(|cover| add_triangle(marks, band.number, cover));
-        }
+fn draw_middles(vectors: impl Vectors, shader: &Shader<'_>, band: &mut Band<'_>) {
+    for (number, chunk) in (0..).zip(shader.chunks).filter(|(_, chunk)| chunk.is_of_ground) {
+        band.draw(vectors, Fours, chunk, number, |_| true);
     }
 }
 
@@ -118,7 +124,7 @@ impl Samples {
         color: &mut [u16],
     ) {
         let width = shader.camera.size_px[0] as usize / ALONG;
-        self.draw(shader, number, marks, width);
+        self.draw(vectors, shader, number, marks, width);
         let mut planes = Planes::new();
         let rows = depth.chunks_exact_mut(stride).zip(shown.chunks_exact(stride)).zip(color.chunks_exact_mut(CHANNELS * stride));
         for (row, ((depth, shown), color)) in rows.enumerate() {
@@ -142,7 +148,7 @@ impl Samples {
 
     /// Which triangles the samples of marked tiles show.
     #[inline(always)]
-    fn draw(&mut self, shader: &Shader<'_>, number: usize, marks: OfBand<'_>, width: usize) {
+    fn draw(&mut self, vectors: impl Vectors, shader: &Shader<'_>, number: usize, marks: OfBand<'_>, width: usize) {
         if marks.is_empty() {
             return;
         }
@@ -163,7 +169,8 @@ impl Samples {
         }
         let mut band = Band { number, stride: self.stride, depth: &mut self.depth, shown: &mut self.shown };
         for (number, chunk) in (0..).zip(shader.chunks) {
-            band.draw(cover::Samples, chunk, number, |cover| marks.has(cover));
+            // Where triangles of models are is marked.
+            band.draw(vectors, cover::Samples, chunk, number, |cover| !chunk.is_of_ground || marks.has(cover));
         }
     }
 
@@ -200,6 +207,7 @@ impl Samples {
     }
 
     /// Keeps the parts of a pixel that shows several triangles.
+    #[inline(always)]
     fn add(&mut self, shader: &Shader<'_>, column: usize, [x, y]: [f32; 2], shown: &Four<u32>) {
         let [r, g, b, _] = shader.camera.uniforms.sky;
         let pixel = self.mixed.len();

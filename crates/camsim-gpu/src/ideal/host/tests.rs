@@ -9,7 +9,10 @@ use super::{
     cover::{BEYOND, Band, Fours, Pixels, Places, SKY, SMALL_PX, Samples},
     triangles::{BAND_ROWS, Chunk, Kind},
 };
-use crate::layout::IdealCamera;
+use crate::{
+    host::vectors::{Vectors, widest},
+    layout::IdealCamera,
+};
 
 const SIZE_PX: [u32; 2] = [200, 150];
 const KIND: Kind = Kind { paint: 0, one_sided: false, sky: None };
@@ -27,6 +30,15 @@ fn camera_at(principal_px: [f32; 2]) -> Camera {
         ..IdealCamera::default()
     };
     Camera { uniforms, focal_px: [100.0, 100.0], principal_px, size_px: SIZE_PX, beside: 0 }
+}
+
+fn draw<P: Places>(places: P, chunk: &Chunk, band: &mut Band<'_>) {
+    widest!(vectors => draw_by(vectors, places, chunk, band))
+}
+
+#[inline(always)]
+fn draw_by<P: Places>(vectors: impl Vectors, places: P, chunk: &Chunk, band: &mut Band<'_>) {
+    band.draw(vectors, places, chunk, 0, |_| true);
 }
 
 fn random(k: u32) -> [f32; 4] {
@@ -52,7 +64,7 @@ fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]
         for number in (0..height.div_ceil(rows)).filter(|&number| !chunk.of_band(number).is_empty()) {
             let first_row = number * rows;
             let (mut depth, mut shown) = (vec![0.0; stride * rows], vec![SKY; stride * rows]);
-            Band { number, stride, depth: &mut depth, shown: &mut shown }.draw(places, &chunk, 0, |_| true);
+            draw(places, &chunk, &mut Band { number, stride, depth: &mut depth, shown: &mut shown });
             for (row, shown) in shown.chunks_exact(stride).enumerate() {
                 assert!(shown[width..].iter().all(|&shown| shown == SKY), "nothing beyond the picture");
                 let is_row = first_row + row < height;
@@ -228,7 +240,7 @@ fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
         let allowed = 0.25 * (nearest - farthest);
         for number in 0..height.div_ceil(BAND_ROWS) {
             let (mut depth, mut shown) = (vec![0.0; stride * BAND_ROWS], vec![SKY; stride * BAND_ROWS]);
-            Band { number, stride, depth: &mut depth, shown: &mut shown }.draw(Pixels, &chunk, 0, |_| true);
+            draw(Pixels, &chunk, &mut Band { number, stride, depth: &mut depth, shown: &mut shown });
             for inverse in depth.into_iter().zip(shown).filter(|&(_, shown)| shown != SKY).map(|(inverse, _)| inverse) {
                 pixels += 1;
                 assert!((farthest - allowed..=nearest + allowed).contains(&inverse), "{k}: {inverse}");
