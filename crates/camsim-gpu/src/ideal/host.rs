@@ -39,11 +39,11 @@ mod triangles;
 
 use corners::{Camera, Corner};
 use cover::{BEYOND, Band, Pixels, Places, SKY};
-use models::{Piece, TRIANGLES_A_CHUNK};
+use models::{Bench, Piece, TRIANGLES_A_CHUNK};
 use picture::Picture;
 use samples::{ALONG, Sampled};
 use shade::{Paint, Planes, Shader};
-use triangles::{BAND_ROWS, Chunk, Kind};
+use triangles::{BAND_ROWS, Chunk, Kind, MORE};
 
 /// Corners of the terrain that a task projects.
 const CORNERS_A_TASK: usize = 4096;
@@ -115,6 +115,9 @@ enum Part {
     /// A piece of a batch's level, at these of the places in view.
     Piece { batch: usize, level: usize, piece: usize, places: Range<usize> },
 }
+
+/// What models are drawn with, without tints of their corners and with them.
+type Benches = (Bench<2>, Bench<{ 2 + MORE }>);
 
 /// What an ideal frame is drawn from.
 #[derive(Clone, Copy)]
@@ -244,8 +247,7 @@ impl HostScene {
     fn project_terrain(&mut self, camera: &Camera, terrain: Option<&PlacedMesh>) {
         let vertices = terrain.map_or(&[][..], |mesh| &mesh.vertices);
         let project = |&[x, y, z, u, v]: &[f32; 5]| camera.corner(camera.in_camera_m([x, y, z]), [u, v]);
-        let nowhere = project(&[0.0; 5]);
-        self.terrain.resize(vertices.len(), nowhere);
+        self.terrain.resize(vertices.len(), Corner::NOWHERE);
         let tasks = self.terrain.par_chunks_mut(CORNERS_A_TASK).zip(vertices.par_chunks(CORNERS_A_TASK));
         tasks.for_each(|(corners, vertices)| {
             widest!(_vectors => corners.iter_mut().zip(vertices).for_each(|(corner, vertex)| *corner = project(vertex)));
@@ -270,11 +272,12 @@ impl HostScene {
     }
 
     fn triangles_of(&self, drawing: &Drawing<'_>, job: &[Part], chunk: &mut Chunk) {
-        widest!(_vectors => job.iter().for_each(|part| self.triangles(drawing, part, chunk)))
+        let mut benches = (Bench::new(), Bench::new());
+        widest!(_vectors => job.iter().for_each(|part| self.triangles(drawing, part, &mut benches, chunk)))
     }
 
     #[inline(always)]
-    fn triangles(&self, drawing: &Drawing<'_>, part: &Part, chunk: &mut Chunk) {
+    fn triangles(&self, drawing: &Drawing<'_>, part: &Part, benches: &mut Benches, chunk: &mut Chunk) {
         let Drawing { camera, pose, view, seen } = drawing;
         match part {
             Part::Terrain(of) => {
@@ -293,8 +296,8 @@ impl HostScene {
                 for &place in &seen[places.clone()] {
                     let stands = &view.buffers.placed[place as usize];
                     match self.paints[paint].has_more {
-                        true => piece.draw_more(camera, pose, stands, model.light, kind, chunk),
-                        false => piece.draw(camera, pose, stands, kind, chunk),
+                        true => piece.draw_more(camera, pose, stands, model.light, kind, &mut benches.1, chunk),
+                        false => piece.draw(camera, pose, stands, kind, &mut benches.0, chunk),
                     }
                 }
             }

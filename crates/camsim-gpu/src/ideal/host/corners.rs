@@ -36,6 +36,11 @@ pub(super) struct Corner<const N: usize> {
     pub is_within: bool,
 }
 
+impl<const N: usize> Corner<N> {
+    /// One that has not been projected.
+    pub const NOWHERE: Self = Self { in_camera_m: [0.0; 3], on_it: [0.0; N], at_px: [0.0; 2], at: [0; 2], inverse: 0.0, is_within: false };
+}
+
 impl Camera {
     /// The same with two by two pixels for each, one for each of its samples.
     pub fn of_samples(&self) -> Self {
@@ -46,6 +51,13 @@ impl Camera {
             beside: SUBPIXELS / 2,
             ..*self
         }
+    }
+
+    /// By how much more than on its axis the picture stretches what is at a distance along that, at its farthest corner: 1 over the cosine of the angle there.
+    pub fn most_stretch(&self) -> f32 {
+        let side =
+            |k: usize| (self.principal_px[k].abs().max((self.size_px[k] as f32 - self.principal_px[k]).abs()) + 1.0) / self.focal_px[k];
+        (1.0 + side(0) * side(0) + side(1) * side(1)).sqrt()
     }
 
     /// Projects a corner.
