@@ -160,7 +160,7 @@ impl Planes {
         let mut planes = Self::default();
         for triangle in indices.as_chunks::<3>().0 {
             let [a, b, c] = triangle.map(|corner| Vec3::from(corners[corner as usize].position_m).as_dvec3());
-            // One without an area is seen from nowhere, and one that is not finite is left to whoever finds it not to be.
+            // One without an area, or with a number that is none, is seen from nowhere.
             let normal = (b - a).cross(c - a).normalize_or_zero();
             for (all, of) in planes.normal.iter_mut().zip(normal.as_vec3().to_array()) {
                 all.push(of);
@@ -188,8 +188,7 @@ impl Planes {
         for (((((nx, ny), nz), along), per_height), is_seen) in planes.zip(is_seen) {
             let before_m = nx.mul_add(x, ny.mul_add(y, nz.mul_add(z, -along)));
             let nearly_m = turned_m.mul_add(*per_height, rounding_m);
-            // Written so that a triangle with a number that is none stays.
-            *is_seen = !(before_m < -nearly_m);
+            *is_seen = before_m >= -nearly_m;
         }
     }
 }
