@@ -13,6 +13,8 @@ pub mod light;
 pub mod mesh;
 pub mod paint_order;
 pub mod picture_tiles;
+mod quad;
+pub(crate) mod ray_tree;
 pub mod terrain;
 pub mod texture;
 

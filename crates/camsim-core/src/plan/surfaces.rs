@@ -8,7 +8,7 @@ use super::NEAR_M;
 use crate::{
     pose::CameraPose,
     scene::{
-        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, Wrap, box_tree::BoxTree, terrain::Frustum,
+        Aabb, Encoding, Mesh, Scene, Shape, Terrain, TerrainHit, Texture, Wrap, box_tree::BoxTree, ray_tree::RayTree, terrain::Frustum,
         terrain::intersect_triangle,
     },
 };
@@ -23,11 +23,11 @@ pub(super) struct Surfaces {
     /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them, and of those that are mixed with it. A ray
     /// passes through thousands of panes to what is behind them.
     tree: BoxTree,
-    deep: BoxTree,
-    solid: BoxTree,
-    mixed: BoxTree,
+    deep: RayTree,
+    solid: RayTree,
+    mixed: RayTree,
     /// Around the triangles of each mesh's shape: meshes that share a shape share its tree.
-    shapes: Vec<Arc<BoxTree>>,
+    shapes: Vec<Arc<ShapeTrees>>,
     /// From NED to the axes of each mesh's shape.
     shape_from_ned: Vec<DMat3>,
     /// Whether anything is mixed with what is behind it.
@@ -101,6 +101,13 @@ impl Panes {
     }
 }
 
+/// Of a shape's triangles, in its own axes.
+#[derive(Debug)]
+struct ShapeTrees {
+    for_rays: RayTree,
+    boxes: BoxTree,
+}
+
 /// Whether alpha reaches the cut-off anywhere on a mesh. `of_pictures` remembers the largest alpha of each picture.
 fn may_have_depth(mesh: &Mesh, of_pictures: &mut HashMap<*const Texture, u8>) -> bool {
     /// Between corners alpha is rounded.
@@ -114,7 +121,7 @@ fn may_have_depth(mesh: &Mesh, of_pictures: &mut HashMap<*const Texture, u8>) ->
 
 impl Surfaces {
     pub fn new(scene: Arc<Scene>) -> Self {
-        let mut known: HashMap<*const Shape, Arc<BoxTree>> = HashMap::new();
+        let mut known: HashMap<*const Shape, Arc<ShapeTrees>> = HashMap::new();
         let tree_of = |shape: &Shape| {
             let triangle = |of: &[u32]| {
                 let mut bounds = Aabb::EMPTY;
@@ -124,14 +131,15 @@ impl Surfaces {
                 let hair = 1e-9 * bounds.min.abs().max(bounds.max.abs()).max_element();
                 Aabb { min: bounds.min - hair, max: bounds.max + hair }
             };
-            Arc::new(BoxTree::new(&shape.indices.chunks_exact(3).map(triangle).collect::<Vec<_>>()))
+            let boxes: Vec<Aabb> = shape.indices.chunks_exact(3).map(triangle).collect();
+            Arc::new(ShapeTrees { for_rays: RayTree::new(&boxes), boxes: BoxTree::new(&boxes) })
         };
         let shapes = scene.meshes.iter().map(|mesh| known.entry(Arc::as_ptr(&mesh.shape)).or_insert_with(|| tree_of(&mesh.shape)).clone());
         let shapes = shapes.collect();
         let bounds = scene.mesh_bounds();
         let tree_if = |counts: &dyn Fn(&Mesh) -> bool| {
             let counted = bounds.iter().zip(&scene.meshes).map(|(of, mesh)| if counts(mesh) { *of } else { Aabb::EMPTY });
-            BoxTree::new(&counted.collect::<Vec<_>>())
+            RayTree::new(&counted.collect::<Vec<_>>())
         };
         let of_pictures = RefCell::new(HashMap::new());
         let deep = tree_if(&|mesh| !mesh.material.blends || may_have_depth(mesh, &mut of_pictures.borrow_mut()));
@@ -162,7 +170,7 @@ impl Surfaces {
         self.meet_in(&self.deep, origin_ned_m, direction_ned)
     }
 
-    fn meet_in(&self, tree: &BoxTree, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
+    fn meet_in(&self, tree: &RayTree, origin_ned_m: DVec3, direction_ned: DVec3) -> Option<Met> {
         let ground = self.terrain().and_then(|terrain| terrain.intersect(origin_ned_m, direction_ned, f64::INFINITY));
         let limit = ground.map_or(f64::INFINITY, |hit| hit.t);
         let on_mesh = tree.first(origin_ned_m, direction_ned, limit, |mesh, limit| {
@@ -183,7 +191,7 @@ impl Surfaces {
             let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
             mesh.shows(corners, weights, direction_ned).then_some((t, (corners, weights)))
         };
-        let (depth_m, (corners, weights)) = self.shapes[i].first(origin, direction, limit, meet)?;
+        let (depth_m, (corners, weights)) = self.shapes[i].for_rays.first(origin, direction, limit, meet)?;
         Some(self.met(i, depth_m, corners, weights, direction_ned))
     }
 
@@ -214,7 +222,7 @@ impl Surfaces {
             let mesh = self.scene.meshes.get(i)?;
             let shape_from_ned = self.shape_from_ned[i];
             let (origin, direction) = (shape_from_ned * (origin_ned_m - mesh.origin_ned_m), shape_from_ned * direction_ned);
-            self.shapes[i].first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
+            self.shapes[i].for_rays.first(origin, direction, limit, |triangle, limit| -> Option<(f64, ())> {
                 let corners = [0, 1, 2].map(|k| mesh.shape.indices[3 * triangle as usize + k]);
                 let points = corners.map(|corner| mesh.position_ned_m(corner));
                 let (t, weights) = intersect_triangle(points, origin_ned_m, direction_ned, limit)?;
@@ -291,7 +299,7 @@ impl Surfaces {
         // The boxes of a shape's triangles, as they stand.
         let of_mesh = |i: u32| {
             let mesh = &self.scene.meshes[i as usize];
-            self.shapes[i as usize].nearest_box_m(|own| measure(&own.turned(mesh.ned_from_shape, mesh.origin_ned_m)))
+            self.shapes[i as usize].boxes.nearest_box_m(|own| measure(&own.turned(mesh.ned_from_shape, mesh.origin_ned_m)))
         };
         let meshes = self.tree.nearest_thing_m(measure, of_mesh);
         // Slant range to planar depth by the widest ray; the camera may come closer within the window.

@@ -33,6 +33,7 @@ use std::{fmt, sync::Arc};
 use glam::{DVec3, Vec3};
 
 pub use bounds::Aabb;
+#[cfg(test)]
 pub(in crate::scene) use bounds::inverse;
 pub use build::TerrainGrid;
 pub use detail::TerrainDetail;

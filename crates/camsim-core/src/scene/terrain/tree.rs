@@ -1,17 +1,14 @@
 //! A quadtree of boxes over the grid.
 //!
-//! The four boxes below one are tested against a ray at once, in single precision: they lie together in memory, relative to the middle of the
-//! whole, and are rounded outwards, so that a ray never misses what is inside of them.
+//! The four boxes below one are [tested against a ray at once](super::super::quad): they lie together in memory, relative to the middle of the whole.
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::DVec3;
 
 use super::bounds::Aabb;
+use crate::scene::quad::{BoxRay, Quad, down};
 
 /// Cells along each side of the tree's leaves.
 pub(super) const BLOCK_CELLS: u32 = 4;
-/// Rounding errors of single precision: of a sum of coordinates, as a part of the largest, and of a ray parameter.
-const ROUNDING: f64 = 4e-7;
-const WIDER: f32 = 1e-6;
 /// Nodes that wait at most: the root, and three on each level of the largest grid that there can be.
 const MOST_WAITING: usize = 3 * 32 + 1;
 
@@ -28,15 +25,8 @@ pub(super) struct BlockTree {
 #[derive(Clone, Debug)]
 struct TreeLevel {
     size: [u32; 2],
-    /// Squares of 2x2 boxes, row after row.
+    /// Squares of 2x2 boxes, row after row: the two of one row, and those of the next.
     quads: Vec<Quad>,
-}
-
-/// Four boxes, by axis: the two of one row, and those of the next. Those that are not there or are empty have every `min` above its `max`.
-#[derive(Clone, Copy, Debug)]
-struct Quad {
-    min: [Vec4; 3],
-    max: [Vec4; 3],
 }
 
 /// A box of the tree.
@@ -44,51 +34,6 @@ struct Quad {
 pub(super) struct Node {
     pub level: u32,
     pub at: [u32; 2],
-}
-
-/// A ray as boxes are tested against it. Its parameter is in metres.
-struct BoxRay {
-    origin: [f32; 3],
-    inverse: [f32; 3],
-    /// Boxes are larger by this much.
-    slack_m: f32,
-}
-
-impl Quad {
-    const EMPTY: Self = Self { min: [Vec4::INFINITY; 3], max: [Vec4::NEG_INFINITY; 3] };
-
-    /// Box number `lane`, relative to the tree's middle.
-    fn get(&self, lane: usize) -> Aabb {
-        let corner = |of: &[Vec4; 3]| Vec3::new(of[0][lane], of[1][lane], of[2][lane]).as_dvec3();
-        Aabb { min: corner(&self.min), max: corner(&self.max) }
-    }
-
-    /// Sets it to one that holds `bounds`.
-    fn set(&mut self, lane: usize, bounds: &Aabb) {
-        for k in 0..3 {
-            self.min[k][lane] = down(bounds.min[k]);
-            self.max[k][lane] = -down(-bounds.max[k]);
-        }
-    }
-
-    /// Ray parameters from which on a ray may be in each box, and which of the boxes it may be in at all, as bits.
-    fn enter(&self, ray: &BoxRay, limit_m: f32) -> (Vec4, u32) {
-        let (mut enter, mut exit) = (Vec4::ZERO, Vec4::splat(limit_m));
-        for k in 0..3 {
-            let near = (self.min[k] - (ray.origin[k] + ray.slack_m)) * ray.inverse[k];
-            let far = (self.max[k] - (ray.origin[k] - ray.slack_m)) * ray.inverse[k];
-            enter = enter.max(near.min(far));
-            exit = exit.min(near.max(far));
-        }
-        let is_met = (enter * (1.0 - WIDER)).cmple(exit * (1.0 + WIDER)) & self.min[0].cmple(self.max[0]);
-        (enter * (1.0 - WIDER), is_met.bitmask())
-    }
-}
-
-/// The next single-precision number at or below one.
-fn down(value: f64) -> f32 {
-    let nearest = value as f32;
-    if f64::from(nearest) > value { nearest.next_down() } else { nearest }
 }
 
 impl BlockTree {
@@ -158,7 +103,7 @@ impl BlockTree {
     /// anything matters, and returns the one from then on: that of a hit, if it has found one.
     pub fn walk(&self, origin: DVec3, direction: DVec3, t_max: f64, block: &mut dyn FnMut([u32; 2], f64) -> f64) {
         let length = direction.length();
-        let ray = self.ray(origin, direction / length);
+        let ray = BoxRay::new(origin - self.middle, direction / length, self.extent_m);
         // Up to the next number above.
         let metres = |t: f64| -down(-t * length);
         let (mut limit, mut limit_m) = (t_max, metres(t_max));
@@ -191,16 +136,6 @@ impl BlockTree {
                 count += 1;
             }
         }
-    }
-
-    /// A ray of unit length.
-    fn ray(&self, origin: DVec3, direction: DVec3) -> BoxRay {
-        /// Components below it never matter: in metres, over any distance that there is.
-        const LEAST: f64 = 1e-30;
-        let from_middle = origin - self.middle;
-        let inverse = |d: f64| (1.0 / if d.abs() < LEAST { LEAST.copysign(d) } else { d }) as f32;
-        let slack_m = 1e-9 + ROUNDING * (from_middle.abs().max_element() + self.extent_m);
-        BoxRay { origin: from_middle.as_vec3().to_array(), inverse: direction.to_array().map(inverse), slack_m: -down(-slack_m) }
     }
 
     /// A box, as large as its rounding makes it.

@@ -1,0 +1,169 @@
+//! A tree of boxes over many small things, for rays.
+
+use glam::DVec3;
+
+use super::{
+    Aabb,
+    quad::{BoxRay, Quad, down},
+};
+
+/// Says of what a box holds that it is one thing, and not a node.
+const THING: u32 = 1 << 31;
+/// Boxes that wait at most: halves are halved again on every second level of up to 2^31 things.
+const MOST_WAITING: usize = 3 * 17 + 1;
+
+/// Boxes within boxes, four and four together: what a ray meets first is found without a look at everything.
+#[derive(Debug, Default)]
+pub(crate) struct RayTree {
+    /// All coordinates are relative to it.
+    middle: DVec3,
+    /// Largest coordinate of a box, metres.
+    extent_m: f64,
+    nodes: Vec<Node>,
+}
+
+#[derive(Debug)]
+struct Node {
+    boxes: Quad,
+    /// What each box holds: the place of a node, or with [`THING`] a thing.
+    holds: [u32; 4],
+}
+
+impl RayTree {
+    /// Over things that are known by their place in `boxes`. Empty boxes are left out.
+    pub fn new(boxes: &[Aabb]) -> Self {
+        let mut things: Vec<u32> = (0..boxes.len() as u32).filter(|&i| !boxes[i as usize].is_empty()).collect();
+        if things.is_empty() {
+            return Self::default();
+        }
+        let whole = around(boxes, &things);
+        let is_finite = whole.min.is_finite() && whole.max.is_finite();
+        let middle = if is_finite { whole.centre() } else { DVec3::ZERO };
+        let extent_m = if is_finite { (whole.max - middle).max_element() } else { f64::INFINITY };
+        let mut tree = Self { middle, extent_m, nodes: Vec::new() };
+        tree.build(boxes, &mut things);
+        tree
+    }
+
+    /// Quarters: halves at the middle thing along the longest side of the box around their centres, and again. Gives the place of their node.
+    fn build(&mut self, boxes: &[Aabb], things: &mut [u32]) -> u32 {
+        let here = self.nodes.len();
+        self.nodes.push(Node { boxes: Quad::EMPTY, holds: [0; 4] });
+        let (left, right) = halves(boxes, things);
+        let ((a, b), (c, d)) = (halves(boxes, left), halves(boxes, right));
+        for (lane, part) in [a, b, c, d].into_iter().enumerate() {
+            let Some(&first) = part.first() else { continue };
+            let bounds = around(boxes, part);
+            let held = if part.len() == 1 { THING | first } else { self.build(boxes, part) };
+            let node = &mut self.nodes[here];
+            node.boxes.set(lane, &Aabb { min: bounds.min - self.middle, max: bounds.max - self.middle });
+            node.holds[lane] = held;
+        }
+        here as u32
+    }
+
+    /// The first meeting of a ray: `meet(thing, limit)` gives the ray parameter and what is found there, for a thing that is met before
+    /// `limit`. Nothing for a direction without a length.
+    pub fn first<T>(&self, origin: DVec3, direction: DVec3, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
+        let length = direction.length();
+        let ray = BoxRay::new(origin - self.middle, direction / length, self.extent_m);
+        // Up to the next number above.
+        let metres = |t: f64| -down(-t * length);
+        let (mut limit, mut limit_m) = (t_max, metres(t_max));
+        let mut best: Option<(f64, T)> = None;
+        let mut waiting = [(0.0_f32, 0_u32); MOST_WAITING];
+        let mut count = usize::from(!self.nodes.is_empty());
+        while count > 0 {
+            count -= 1;
+            let (enter_m, held) = waiting[count];
+            if enter_m > limit_m {
+                continue;
+            }
+            if held & THING != 0 {
+                if let Some(met) = meet(held & !THING, limit) {
+                    (limit, limit_m) = (met.0, metres(met.0));
+                    best = Some(met);
+                }
+                continue;
+            }
+            let Node { boxes, holds } = &self.nodes[held as usize];
+            let (enter, mut is_met) = boxes.enter(&ray, limit_m);
+            let first = count;
+            while is_met != 0 {
+                let lane = is_met.trailing_zeros() as usize;
+                is_met &= is_met - 1;
+                // Nearest last, so that it comes off first.
+                let mut place = count;
+                while place > first && waiting[place - 1].0 < enter[lane] {
+                    waiting[place] = waiting[place - 1];
+                    place -= 1;
+                }
+                waiting[place] = (enter[lane], holds[lane]);
+                count += 1;
+            }
+        }
+        best
+    }
+}
+
+fn around(boxes: &[Aabb], things: &[u32]) -> Aabb {
+    things.iter().fold(Aabb::EMPTY, |all, &thing| all.union(&boxes[thing as usize]))
+}
+
+fn halves<'a>(boxes: &[Aabb], things: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
+    let centre = |thing: u32| boxes[thing as usize].centre();
+    let mut centres = Aabb::EMPTY;
+    things.iter().for_each(|&thing| centres.include(centre(thing)));
+    let sides = centres.max - centres.min;
+    let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
+    let middle = things.len() / 2;
+    if things.len() > 1 {
+        things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+    }
+    things.split_at_mut(middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::terrain::inverse;
+
+    #[test]
+    fn the_first_that_a_ray_meets_is_what_a_look_at_everything_finds() {
+        let part = |k: u32, step: f64| (f64::from(k) * step).fract();
+        // Far from their origin too, and with boxes that are flat or at the same place.
+        for (count, away_m) in [(0, 0.0), (1, 10.0), (2, 0.0), (4, 0.0), (5, -300.0), (300, 0.0), (1000, 6.4e6)] {
+            let of = |k: u32| {
+                let k = k - k % 7 / 6;
+                let min = away_m + 40.0 * DVec3::new(part(k, 0.618_034), part(k, 0.754_878), part(k, 0.569_840));
+                let size = 2.0 * DVec3::new(part(k, 0.31), part(k, 0.47), if k.is_multiple_of(5) { 0.0 } else { part(k, 0.83) });
+                if k % 11 == 3 { Aabb::EMPTY } else { Aabb { min, max: min + size } }
+            };
+            let boxes: Vec<Aabb> = (0..count).map(of).collect();
+            let tree = RayTree::new(&boxes);
+            let (mut met, mut asked) = (0, 0);
+            for k in 0..400 {
+                let angle = 0.1 * f64::from(k);
+                let origin = away_m + DVec3::new(20.0 + 30.0 * angle.cos(), 20.0 + 30.0 * angle.sin(), 0.1 * f64::from(k));
+                let aslant = DVec3::new(-angle.cos(), -angle.sin(), 0.3 * (0.7 * f64::from(k)).sin());
+                let along = DVec3::new(-angle.cos().signum(), 0.0, 0.0);
+                let direction = [aslant, along, 1e-6 * aslant, 3e5 * aslant, aslant][k as usize % 5];
+                let t_max = if k % 3 == 0 { f64::INFINITY } else { 45.0 / direction.length() };
+                let enter = |i: u32, limit: f64| boxes[i as usize].enter(origin, inverse(direction), limit).map(|t| (t, i));
+                let all = (0..count).filter_map(|i| enter(i, t_max)).min_by(|a, b| a.0.total_cmp(&b.0));
+                let asked_now = std::cell::Cell::new(0);
+                let found = tree.first(origin, direction, t_max, |i, limit| {
+                    asked_now.set(asked_now.get() + 1);
+                    enter(i, limit)
+                });
+                assert_eq!(found.map(|hit| hit.0), all.map(|hit| hit.0), "{count} boxes, ray {k}");
+                met += u32::from(found.is_some());
+                asked += asked_now.get();
+            }
+            assert!(count < 300 || met > 40, "{met}");
+            assert!(asked <= 400 * count.min(20), "{count}: {asked}");
+        }
+        let tree = RayTree::new(&[Aabb { min: DVec3::ZERO, max: DVec3::ONE }]);
+        assert_eq!(tree.first(DVec3::splat(0.5), DVec3::ZERO, 1.0, |i, _| Some((0.0, i))), None);
+    }
+}
