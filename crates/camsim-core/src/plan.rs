@@ -354,7 +354,7 @@ impl Planner {
         // Coordinates are those of the middle of the frame's own window, wherever the ideal frame is taken.
         let middle_s = 0.5 * (window_s[0] + window_s[1]);
         let span_s = self.sequence.path.span_s();
-        Ok(FramePlan {
+        let mut plan = FramePlan {
             frame,
             preset: quality.preset,
             stamp_s,
@@ -386,7 +386,14 @@ impl Planner {
             skipped,
             price_ms: picture.price.ms + way.ms(),
             ideal_price_ms: picture.price.ideal_ms,
-        })
+        };
+        if plan.copied_from().is_some() {
+            plan.skipped.push(Skip {
+                what: "reads between ideal pixels",
+                reason: "on the host: the camera's pixels are the ideal frame's own".into(),
+            });
+        }
+        Ok(plan)
     }
 
     /// What the scenario as a whole makes unnecessary.

@@ -145,6 +145,7 @@ fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
             scenario.quality.footprint_taps = Auto::Value(taps);
         }
     };
+    let coarsely = |scenario: &mut Scenario| scenario.quality.max_error_dn = 40.0;
     let shaking = |hz: f64| {
         move |scenario: &mut Scenario| {
             scenario.camera.mount.vibration =
@@ -154,6 +155,15 @@ fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
     vec![
         ("nothing moves", camera(0.0), still()),
         ("nothing moves, lens", lens(camera(0.0)), still()),
+        ("copied", set(camera(0.0), &coarsely), still()),
+        (
+            "copied, noise",
+            set(camera(0.0), &|scenario| {
+                coarsely(scenario);
+                scenario.camera.photometric.noise_sigma = 0.05;
+            }),
+            still(),
+        ),
         ("turning", camera(0.0), turning()),
         ("turning, exposure", lens(camera(12.0)), turning()),
         ("flying", lens(camera(0.0)), flying()),
@@ -220,6 +230,7 @@ fn the_host_makes_the_same_picture() {
     plans.extend([52, 98].map(|frame| assert_same("all effects", &engines, &loaded.sequence, frame)));
     let by_rays = plans.iter().filter(|plan| plan.looks_for_itself()).count();
     assert!(by_rays > 10 && plans.len() - by_rays > 10, "truth is told here and there");
+    assert!(plans.iter().filter(|plan| plan.copied_from().is_some()).count() >= 4, "some are copied");
     let keys: Vec<PipelineKey> = plans.iter().map(PipelineKey::of).collect();
     assert_all(&keys.iter().map(|key| key.ray).collect(), [RayStage::Pinhole, RayStage::LensMap]);
     assert_all(&keys.iter().map(|key| key.temporal).collect(), [TemporalKind::Identity, TemporalKind::Rotation, TemporalKind::Reproject]);

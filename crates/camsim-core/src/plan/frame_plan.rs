@@ -123,6 +123,22 @@ impl FramePlan {
         matches!(self.keys.as_slice(), [key] if key.t_s != self.key_s)
     }
 
+    /// The ideal pixel that the first pixel of the output is, where pixels of the output are those of the ideal frame: nothing bends rays or moves, both cameras are as fine, and
+    /// places of pixels are whole pixels apart, as [`super::bounds`] has them. Then nothing is read between them.
+    #[must_use]
+    pub fn copied_from(&self) -> Option<[u32; 2]> {
+        /// Rounding of the difference of principal points, pixels.
+        const HAIR_PX: f64 = 1e-9;
+        let is_plain = self.preset == Preset::Default && self.ray == RayStage::Pinhole && !self.edges.has_rays();
+        let is_sharp = self.temporal == TemporalStage::Identity && self.blur.is_none() && self.taps == TapStage::Bilinear;
+        let first_px = self.ideal.principal_px - self.camera.principal_point_px;
+        let is_whole = (first_px - first_px.round()).abs().max_element() < HAIR_PX && first_px.min_element() > -0.5;
+        let is_copied = is_plain && is_sharp && is_whole && self.keys.len() == 1 && self.ideal.focal_px == self.camera.focal_px;
+        let first = first_px.round().to_array().map(|px| px as u32);
+        let is_within = |axis: usize| u64::from(first[axis]) + u64::from(self.camera.size_px[axis]) <= u64::from(self.ideal.size_px[axis]);
+        (is_copied && is_within(0) && is_within(1)).then_some(first)
+    }
+
     /// Pose of the ideal frame's camera; of several the middle one's.
     #[must_use]
     pub fn ideal_pose(&self) -> CameraPose {

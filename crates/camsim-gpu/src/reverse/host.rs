@@ -19,10 +19,10 @@ use crate::{
     reverse::{KeyKind, PipelineKey, TapKind, TemporalKind},
 };
 
+mod copied;
 mod footprint;
 mod gather;
 mod ideal;
-
 mod photometric;
 mod rays;
 mod source;
@@ -136,6 +136,8 @@ struct Reads<'a> {
     /// Pose of the key camera in the mid-window camera, if it is another one and somebody asks.
     elsewhere: Option<Pose>,
     tells_truth: bool,
+    /// The first pixel's place in the ideal frame, where pixels are those.
+    copied_from: Option<[u32; 2]>,
     segments: &'a [[f32; 2]],
     cells: &'a Cells,
 }
@@ -165,6 +167,7 @@ impl HostKernel {
             poses,
             elsewhere: poses.get(height * poses_a_line(frame)).copied().filter(|_| key.keys == KeyKind::Elsewhere),
             tells_truth,
+            copied_from: plan.copied_from(),
             segments: &self.segments,
             cells: &self.cells,
         };
@@ -201,6 +204,9 @@ impl Reads<'_> {
 
     #[inline(always)]
     fn rows_by(&self, vectors: impl Vectors, first: u32, rows: &mut [f32], truth: &mut [Truth]) {
+        if let Some(from) = self.copied_from.filter(|_| !self.tells_truth) {
+            return self.copied_rows(vectors, from, first, rows);
+        }
         let width = self.frame.size_px[0] as usize;
         // Blocks below each other first: what they read of the ideal frame is nearly the same.
         for x in (0..width).step_by(LANES) {
@@ -229,7 +235,7 @@ impl Reads<'_> {
             let sides = || rays::sides(self.frame, self.map, x, y);
             let area = Footprint::new(self.cells, self.tap, sides, self.frame.max_taps);
             let gathered = self.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, &wanted);
-            colors = gathered.color;
+            colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
             // What is black whatever it shows is not looked for.
             inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
             if self.tells_truth {
