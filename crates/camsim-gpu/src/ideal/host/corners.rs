@@ -53,13 +53,6 @@ impl Camera {
         }
     }
 
-    /// By how much more than on its axis the picture stretches what is at a distance along that, at its farthest corner: 1 over the cosine of the angle there.
-    pub fn most_stretch(&self) -> f32 {
-        let side =
-            |k: usize| (self.principal_px[k].abs().max((self.size_px[k] as f32 - self.principal_px[k]).abs()) + 1.0) / self.focal_px[k];
-        (1.0 + side(0) * side(0) + side(1) * side(1)).sqrt()
-    }
-
     /// Projects a corner.
     #[inline(always)]
     pub fn corner<const N: usize>(&self, in_camera_m: [f32; 3], on_it: [f32; N]) -> Corner<N> {
