@@ -390,7 +390,7 @@ impl Planner {
         if plan.copied_from().is_some() {
             plan.skipped.push(Skip {
                 what: "reads between ideal pixels",
-                reason: "on the host: the camera's pixels are the ideal frame's own".into(),
+                reason: "where the host makes the picture: the camera's pixels are the ideal frame's own".into(),
             });
         }
         Ok(plan)

@@ -332,6 +332,19 @@ mod tests {
         // A picture again, turned, as a mesh of the same shape.
         let ned_from_shape = DMat3::from_rotation_z(0.5) * DMat3::from_rotation_x(0.4) * 1.3;
         scene.meshes.push(Mesh { ned_from_shape, origin_ned_m: DVec3::new(-40.0, -50.0, -70.0), ..scene.meshes[1].clone() });
+        // Mirrored, and pressed flat: of that there is no way back to the shape's axes.
+        let sides = [DVec3::new(-1.0, 1.2, 1.0), DVec3::new(0.6, 0.6, 0.0), DVec3::new(1.0, 0.0, 1.0)];
+        scene.meshes.extend(
+            sides
+                .into_iter()
+                .enumerate()
+                .map(|(k, sides)| Mesh {
+                    ned_from_shape: DMat3::from_rotation_x(0.1) * DMat3::from_diagonal(sides),
+                    origin_ned_m: DVec3::new(30.0 * k as f64 - 20.0, 25.0, -65.0 - k as f64),
+                    ..scene.meshes[1].clone()
+                })
+                .collect::<Vec<_>>(),
+        );
         let terrain = scene.terrain.as_ref().unwrap();
         let of_terrain: Vec<[DVec3; 3]> = (0..terrain.chunks.len() as u32)
             .flat_map(|chunk| {
@@ -344,7 +357,7 @@ mod tests {
             })
             .collect();
         let surfaces = Surfaces::new(Arc::new(scene.clone()));
-        let (mut seen, mut missed) = ([0; 2], 0);
+        let (mut seen, mut missed, mut flat) = ([0; 2], 0, 0);
         for k in 0..150 {
             let angle = 0.37 * f64::from(k);
             let origin = DVec3::new(3.0 * f64::from(k % 71) - 100.0, 40.0 * angle.sin(), -80.0);
@@ -361,11 +374,12 @@ mod tests {
                 Some(met) => {
                     assert_eq!(met.surface > 0, meshes < ground);
                     seen[usize::from(met.surface > 0)] += 1;
+                    flat += u32::from(met.surface == 6);
                 }
                 None => missed += 1,
             }
         }
-        assert!(seen[0] > 50 && seen[1] > 10 && missed > 2, "{seen:?} {missed}");
+        assert!(seen[0] > 50 && seen[1] > 10 && missed > 2 && flat > 2, "{seen:?} {missed} {flat}");
     }
 
     #[test]

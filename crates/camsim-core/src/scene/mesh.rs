@@ -104,7 +104,8 @@ pub struct Mesh {
     pub material: Material,
     /// NED position of the shape's origin, metres.
     pub origin_ned_m: DVec3,
-    /// From the shape's axes to north-east-down; may scale, not mirror.
+    /// From the shape's axes to north-east-down; may turn, scale and mirror. Triangles have their fronts where they turn anticlockwise as the mesh stands: those of a shape that is mirrored turn the other
+    /// way in its own axes.
     pub ned_from_shape: DMat3,
 }
 

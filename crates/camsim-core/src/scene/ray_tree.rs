@@ -63,9 +63,12 @@ impl RayTree {
     }
 
     /// The first meeting of a ray: `meet(thing, limit)` gives the ray parameter and what is found there, for a thing that is met before
-    /// `limit`. Nothing for a direction without a length.
+    /// `limit`. All are asked where the ray has numbers that are none: no ray leads to the axes of what is pressed flat.
     pub fn first<T>(&self, origin: DVec3, direction: DVec3, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
         let length = direction.length();
+        if !(length.is_normal() && origin.is_finite()) {
+            return self.first_of_all(t_max, meet);
+        }
         let ray = BoxRay::new(origin - self.middle, direction / length, self.extent_m);
         // Up to the next number above.
         let metres = |t: f64| -down(-t * length);
@@ -103,6 +106,16 @@ impl RayTree {
             }
         }
         best
+    }
+
+    /// The same by a look at everything.
+    fn first_of_all<T>(&self, t_max: f64, meet: impl Fn(u32, f64) -> Option<(f64, T)>) -> Option<(f64, T)> {
+        let is_there = |node: &Node, lane: usize| node.holds[lane] & THING != 0 && !node.boxes.get(lane).is_empty();
+        let things = self.nodes.iter().flat_map(|node| (0..4).filter(|&lane| is_there(node, lane)).map(|lane| node.holds[lane] & !THING));
+        things.fold(None, |best: Option<(f64, T)>, thing| {
+            let limit = best.as_ref().map_or(t_max, |(t, _)| *t);
+            meet(thing, limit).or(best)
+        })
     }
 }
 
@@ -163,7 +176,18 @@ mod tests {
             assert!(count < 300 || met > 40, "{met}");
             assert!(asked <= 400 * count.min(20), "{count}: {asked}");
         }
-        let tree = RayTree::new(&[Aabb { min: DVec3::ZERO, max: DVec3::ONE }]);
-        assert_eq!(tree.first(DVec3::splat(0.5), DVec3::ZERO, 1.0, |i, _| Some((0.0, i))), None);
+    }
+
+    #[test]
+    fn a_ray_that_leads_nowhere_asks_all() {
+        let boxes: Vec<Aabb> = (0..23).map(|k| Aabb { min: DVec3::splat(f64::from(k)), max: DVec3::splat(f64::from(k) + 0.5) }).collect();
+        let tree = RayTree::new(&boxes);
+        for (origin, direction) in
+            [(DVec3::NAN, DVec3::NAN), (DVec3::ONE, DVec3::NAN), (DVec3::INFINITY, DVec3::X), (DVec3::ONE, DVec3::ZERO)]
+        {
+            let meet = |i: u32, limit: f64| Some((f64::from((7 * i + 5) % 23), i)).filter(|(t, _)| *t < limit);
+            assert_eq!(tree.first(origin, direction, f64::INFINITY, meet), Some((0.0, 19)), "{origin} {direction}");
+            assert_eq!(tree.first(origin, direction, 0.0, meet), None);
+        }
     }
 }

@@ -8,7 +8,7 @@ pub(super) const SUBPIXEL_BITS: u32 = 8;
 /// How far from the first pixel a corner may be in the picture, pixels: so far products of two differences are exact in 64 bits.
 const FARTHEST_PX: f32 = 32_768.0;
 /// Where triangles are cut, so that rounding leaves what is cut within.
-const CUT_PX: f32 = 0.99 * FARTHEST_PX;
+pub(super) const CUT_PX: f32 = 0.99 * FARTHEST_PX;
 
 /// Numbers of the key camera, and of fog.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use camsim_core::{
 use glam::{DMat3, DVec3, Vec3};
 
 use super::{
-    corners::{Camera, Corner, SUBPIXELS},
+    corners::{CUT_PX, Camera, Corner, SUBPIXELS},
     triangles::{Chunk, Kind, MORE},
 };
 use crate::upload::PlacedShape;
@@ -158,7 +158,7 @@ impl Planes {
         let mut planes = Self::default();
         for triangle in indices.as_chunks::<3>().0 {
             let [a, b, c] = triangle.map(|corner| Vec3::from(corners[corner as usize].position_m).as_dvec3());
-            // One without an area, or with a number that is none, is seen from nowhere.
+            // One without an area has no height and stays; one with a number that is none draws nothing.
             let normal = (b - a).cross(c - a).normalize_or_zero();
             for (all, of) in planes.normal.iter_mut().zip(normal.as_vec3().to_array()) {
                 all.push(of);
@@ -185,10 +185,12 @@ impl Planes {
         if !turned_m2.is_finite() || !rounding_m.is_finite() {
             return;
         }
+        // Where a shape is mirrored, fronts are on the other side in its own axes.
+        let front = place.volume.signum();
         let [normal_x, normal_y, normal_z] = &self.normal;
         let planes = normal_x.iter().zip(normal_y).zip(normal_z).zip(&self.along_m).zip(&self.per_height);
         for (((((nx, ny), nz), along), per_height), is_seen) in planes.zip(is_seen) {
-            let before_m = nx.mul_add(x, ny.mul_add(y, nz.mul_add(z, -along)));
+            let before_m = front * nx.mul_add(x, ny.mul_add(y, nz.mul_add(z, -along)));
             let nearly_m = turned_m2.mul_add(*per_height, rounding_m);
             *is_seen = before_m >= -nearly_m;
         }
@@ -201,7 +203,7 @@ struct Place {
     from_camera_m: [f32; 3],
     /// The camera in the shape's axes.
     eye_m: [f32; 3],
-    /// How much longer lengths are at most, of those in the shape's axes, and how many times larger volumes.
+    /// How much longer lengths are at most, of those in the shape's axes, and how many times larger volumes; less than 0 where it is mirrored.
     most: f32,
     volume: f32,
 }
@@ -225,22 +227,23 @@ impl Place {
     }
 
     /// Of a shape of which nothing is farther than `reach_m` from its origin: what a triangle's plane must be before or behind the eye at least to be sure of its side, times its height; in the shape's
-    /// axes. Infinite where some of it may be behind the camera, and of what is pressed flat.
+    /// axes. Infinite where some of it may be behind the camera or cut off, and of what is pressed flat.
     fn turned_m2(&self, camera: &Camera, reach_m: f32) -> f32 {
         let [x, y, z] = self.from_camera_m;
         let reach_m = self.most * reach_m;
         let (near_m, far_m) = (z - reach_m, z + reach_m);
-        let is_ahead = near_m >= camera.uniforms.near_m && self.volume > 0.0;
-        if !is_ahead {
-            return f32::INFINITY;
-        }
         let beside = ((x * x + y * y).sqrt() + reach_m) / near_m;
         let ([fx, fy], [cx, cy]) = (camera.focal_px, camera.principal_px);
         // Corners stand half a step of the grid beside where they are at most, and what single precision leaves of metres and of pixels.
         let most_px = fx.max(fy) * (beside + far_m / near_m) + cx.abs().max(cy.abs());
+        // Corners farther out are cut off, and what is left has heights of its own.
+        let is_whole = near_m >= camera.uniforms.near_m && most_px < CUT_PX && self.volume != 0.0;
+        if !is_whole {
+            return f32::INFINITY;
+        }
         let moved_px = std::f32::consts::SQRT_2 * (0.5 / SUBPIXELS as f32 + 2.0 * f32::EPSILON * most_px);
         let stretch = (1.0 + beside * beside).sqrt();
-        HEIGHT_LOST * moved_px * stretch * self.most * far_m * far_m * (far_m / near_m) / (fx.min(fy) * self.volume)
+        HEIGHT_LOST * moved_px * stretch * self.most * far_m * far_m * (far_m / near_m) / (fx.min(fy) * self.volume.abs())
     }
 
     #[inline(always)]
