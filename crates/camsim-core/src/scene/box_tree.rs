@@ -34,26 +34,18 @@ impl BoxTree {
         tree
     }
 
-    /// Halves at the middle thing along the longest side of the box around their centres.
     fn build(&mut self, boxes: &[Aabb], things: &mut [u32], first: u32) {
-        let centre = |thing: u32| boxes[thing as usize].centre();
-        let bounds = things.iter().fold(Aabb::EMPTY, |all, &thing| all.union(&boxes[thing as usize]));
         let here = self.nodes.len();
-        self.nodes.push(Node { bounds, next: first, count: things.len() as u32 });
+        self.nodes.push(Node { bounds: around(boxes, things), next: first, count: things.len() as u32 });
         if things.len() <= LEAF {
             return;
         }
-        let mut centres = Aabb::EMPTY;
-        things.iter().for_each(|&thing| centres.include(centre(thing)));
-        let sides = centres.max - centres.min;
-        let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
-        let middle = things.len() / 2;
-        things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
-        let (left, right) = things.split_at_mut(middle);
+        let (left, right) = halves(boxes, things);
+        let middle = left.len() as u32;
         self.build(boxes, left, first);
         self.nodes[here].count = 0;
         self.nodes[here].next = self.nodes.len() as u32;
-        self.build(boxes, right, first + middle as u32);
+        self.build(boxes, right, first + middle);
     }
 
     /// The things of all leaves whose boxes overlap `bounds` or touch it, in no order.
@@ -106,6 +98,25 @@ impl BoxTree {
         }
         nearest
     }
+}
+
+/// The box around some things' boxes.
+pub(super) fn around(boxes: &[Aabb], things: &[u32]) -> Aabb {
+    things.iter().fold(Aabb::EMPTY, |all, &thing| all.union(&boxes[thing as usize]))
+}
+
+/// Things before and from the middle one on, along the longest side of the box around their centres.
+pub(super) fn halves<'a>(boxes: &[Aabb], things: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
+    let centre = |thing: u32| boxes[thing as usize].centre();
+    let mut centres = Aabb::EMPTY;
+    things.iter().for_each(|&thing| centres.include(centre(thing)));
+    let sides = centres.max - centres.min;
+    let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
+    let middle = things.len() / 2;
+    if things.len() > 1 {
+        things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
+    }
+    things.split_at_mut(middle)
 }
 
 #[cfg(test)]

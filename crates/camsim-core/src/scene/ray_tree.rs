@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::{
     Aabb,
+    box_tree::{around, halves},
     quad::{BoxRay, Quad, down},
 };
 
@@ -45,7 +46,7 @@ impl RayTree {
         tree
     }
 
-    /// Quarters: halves at the middle thing along the longest side of the box around their centres, and again. Gives the place of their node.
+    /// Halves, and halves of these. Gives the place of their node.
     fn build(&mut self, boxes: &[Aabb], things: &mut [u32]) -> u32 {
         let here = self.nodes.len();
         self.nodes.push(Node { boxes: Quad::EMPTY, holds: [0; 4] });
@@ -117,23 +118,6 @@ impl RayTree {
             meet(thing, limit).or(best)
         })
     }
-}
-
-fn around(boxes: &[Aabb], things: &[u32]) -> Aabb {
-    things.iter().fold(Aabb::EMPTY, |all, &thing| all.union(&boxes[thing as usize]))
-}
-
-fn halves<'a>(boxes: &[Aabb], things: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
-    let centre = |thing: u32| boxes[thing as usize].centre();
-    let mut centres = Aabb::EMPTY;
-    things.iter().for_each(|&thing| centres.include(centre(thing)));
-    let sides = centres.max - centres.min;
-    let axis = [1, 2].into_iter().fold(0, |longest, axis| if sides[axis] > sides[longest] { axis } else { longest });
-    let middle = things.len() / 2;
-    if things.len() > 1 {
-        things.select_nth_unstable_by(middle, |&a, &b| centre(a)[axis].total_cmp(&centre(b)[axis]));
-    }
-    things.split_at_mut(middle)
 }
 
 #[cfg(test)]

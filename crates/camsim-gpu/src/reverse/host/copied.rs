@@ -1,10 +1,7 @@
 //! Pixels that are those of the ideal frame, and only need what the sensor makes of their colours.
 
-use super::{Reads, photometric};
+use super::{Reads, ideal::CHANNELS, photometric};
 use crate::host::{lanes::LANES, vectors::Vectors};
-
-/// Half floats of a texel.
-const CHANNELS: usize = 4;
 
 impl Reads<'_> {
     /// Rows from `first` on, whose colours are the ideal frame's from a place on that the output's first pixel has there.

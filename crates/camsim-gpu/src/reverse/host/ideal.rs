@@ -6,7 +6,7 @@ use crate::host::vectors::Vectors;
 use crate::layout::FrameUniforms;
 
 /// Half floats of a texel.
-const CHANNELS: usize = 4;
+pub(super) const CHANNELS: usize = 4;
 
 /// Colours of the left and of the right texels that a pixel's reads lie between, to be added in the end: R G B A each.
 pub(super) type Halves = [f32; 2 * CHANNELS];
