@@ -180,7 +180,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     if let Some(Models { detail: ModelDetail { meshes, triangles, finest_triangles }, tolerance_px }) = models {
         console.line("models in this frame")?;
         console.line(format_args!(
-            "  {meshes} meshes of {triangles} triangles, off by at most {tolerance_px:.3} px; {finest_triangles} at the finest level"
+            "  {meshes} meshes of {triangles} triangles, off by at most {tolerance_px:.3} px of the picture; {finest_triangles} at the finest level"
         ))?;
     }
     Ok(())
@@ -202,7 +202,7 @@ fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
     let scene = &sequence.scene;
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
     let detail = || ModelDetail::new(scene, &SceneLevels::new(scene), &plan.ideal_pose(), &tolerance);
-    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px })
+    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px / plan.ideal_px_a_pixel().max(1.0) })
 }
 
 /// The choice that the ideal pass makes.

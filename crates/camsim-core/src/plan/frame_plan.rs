@@ -145,16 +145,23 @@ impl FramePlan {
         self.keys.get(self.keys.len() / 2).map_or(self.key_pose, |key| key.pose)
     }
 
-    /// How far the surfaces of models may be from where they are, in the ideal frames: frames that share one agree on it.
+    /// How far the surfaces of models may be from where they are, in the ideal frames: frames that share one agree on it. In ideal frames that are finer than the picture, as they are for borders
+    /// between surfaces, they may be as many more of their pixels.
     #[must_use]
     pub fn model_tolerance(&self, quality: &QualitySpec) -> LevelTolerance {
         LevelTolerance {
             focal_px: self.ideal.focal_px.max_element(),
             tangents: self.tangents(),
-            error_px: MODEL_SHARE * self.terrain_error_px,
+            error_px: MODEL_SHARE * self.terrain_error_px * self.ideal_px_a_pixel().max(1.0),
             travel_m: self.motion.travel_m,
             parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
         }
+    }
+
+    /// How many of the ideal frame's pixels are as long as one of the picture, where the lens leaves it as it is.
+    #[must_use]
+    pub fn ideal_px_a_pixel(&self) -> f64 {
+        self.ideal.focal_px.max_element() / self.camera.focal_px.min_element()
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.

@@ -33,18 +33,26 @@ pub(crate) trait Vectors: Copy + Sync {
     /// Sums of two products for each, those of whole numbers modulo 2^32.
     fn mixed(self, factors: [i32; 2], of: [&Wholes; 2]) -> Wholes;
     fn mixed_numbers(self, factors: [f32; 2], of: [&Numbers; 2]) -> Numbers;
+    /// Whether it is at any of the places.
+    fn is_any_inside(self, what: &Inside<'_>) -> bool;
     /// Shows what is nearer than what is there, where it is.
     fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]);
+}
+
+/// Where something is, of places side by side.
+#[derive(Clone, Copy)]
+pub(crate) struct Inside<'a> {
+    /// It is where all of these are at least 0: each the sum of one number for all places and one for each. They wrap around.
+    pub sides: [(i32, &'a Wholes); 3],
+    /// Places after the first one that are asked.
+    pub last: i32,
 }
 
 /// Something that some of the places side by side may show.
 pub(crate) struct Shown<'a> {
     /// Its number.
     pub name: u32,
-    /// It is where all of these are at least 0: each the sum of one number for all places and one for each. They wrap around.
-    pub inside: [(i32, &'a Wholes); 3],
-    /// Places after the first one that are asked.
-    pub last: i32,
+    pub inside: Inside<'a>,
     /// How near it is, such a sum too: the more the nearer.
     pub near: (f32, &'a Numbers),
 }
@@ -55,6 +63,15 @@ pub(crate) struct Any;
 
 /// Numbers of places side by side.
 const PLACES: Wholes = [0, 1, 2, 3, 4, 5, 6, 7];
+
+impl Inside<'_> {
+    #[inline(always)]
+    fn is_at(&self, i: usize) -> bool {
+        // Less than 0 is what is less than 0 anywhere.
+        let sides = self.sides.iter().fold(0, |bits, (all, each)| bits | all.wrapping_add(each[i]));
+        (sides | (self.last - PLACES[i])) >= 0
+    }
+}
 
 impl Vectors for Any {
     /// Moved to where a float has exponent and fraction, and set right by a factor.
@@ -85,12 +102,15 @@ impl Vectors for Any {
     }
 
     #[inline(always)]
+    fn is_any_inside(self, what: &Inside<'_>) -> bool {
+        (0..SIDE_BY_SIDE).any(|i| what.is_at(i))
+    }
+
+    #[inline(always)]
     fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]) {
         for i in 0..SIDE_BY_SIDE {
-            // Less than 0 is what is less than 0 anywhere.
-            let sides = what.inside.iter().fold(0, |bits, (all, each)| bits | all.wrapping_add(each[i]));
             let near = what.near.0 + what.near.1[i];
-            if (sides | (what.last - PLACES[i])) >= 0 && near > depth[i] {
+            if what.inside.is_at(i) && near > depth[i] {
                 (depth[i], shown[i]) = (near, what.name);
             }
         }
@@ -112,7 +132,7 @@ mod x86 {
         },
     };
 
-    use super::{Numbers, PLACES, SIDE_BY_SIDE, Shown, Vectors, Wholes};
+    use super::{Inside, Numbers, PLACES, SIDE_BY_SIDE, Shown, Vectors, Wholes};
 
     /// x86-64 with AVX2, FMA and F16C, which nearly all have: there is one only where they were found.
     #[derive(Clone, Copy, Debug)]
@@ -131,6 +151,22 @@ mod x86 {
             }
             // SAFETY: `self` tells that this processor has them.
             unsafe { compiled(self, work) }
+        }
+    }
+
+    impl Avx2 {
+        /// Its first bits tell where it is not.
+        #[inline(always)]
+        fn beyond(self, what: &Inside<'_>) -> __m256 {
+            let [(a, of_a), (b, of_b), (c, of_c)] = what.sides;
+            let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
+            let places: __m256i = bytemuck::cast(PLACES);
+            // SAFETY: `self` tells that this processor has it.
+            unsafe {
+                let sum = |all: i32, each: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), each);
+                let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
+                _mm256_castsi256_ps(_mm256_or_si256(beside, _mm256_sub_epi32(_mm256_set1_epi32(what.last), places)))
+            }
         }
     }
 
@@ -166,19 +202,20 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn is_any_inside(self, what: &Inside<'_>) -> bool {
+            // SAFETY: `self` tells that this processor has it.
+            unsafe { _mm256_movemask_ps(self.beyond(what)) != 0xff }
+        }
+
+        #[inline(always)]
         fn show(self, what: &Shown<'_>, depth: &mut Numbers, shown: &mut [u32; SIDE_BY_SIDE]) {
-            let [(a, of_a), (b, of_b), (c, of_c)] = what.inside;
-            let [of_a, of_b, of_c]: [__m256i; 3] = [of_a, of_b, of_c].map(|of| bytemuck::cast(*of));
-            let (places, near, before): (__m256i, __m256, __m256) =
-                (bytemuck::cast(PLACES), bytemuck::cast(*what.near.1), bytemuck::cast(*depth));
+            let (near, before): (__m256, __m256) = (bytemuck::cast(*what.near.1), bytemuck::cast(*depth));
+            let beyond = self.beyond(&what.inside);
             // SAFETY: `self` tells that this processor has it.
             unsafe {
-                let sum = |all: i32, each: __m256i| _mm256_add_epi32(_mm256_set1_epi32(all), each);
-                let beside = _mm256_or_si256(_mm256_or_si256(sum(a, of_a), sum(b, of_b)), sum(c, of_c));
-                let beyond = _mm256_or_si256(beside, _mm256_sub_epi32(_mm256_set1_epi32(what.last), places));
                 let near = _mm256_add_ps(_mm256_set1_ps(what.near.0), near);
                 // The first bit of each number decides.
-                let is_shown = _mm256_andnot_ps(_mm256_castsi256_ps(beyond), _mm256_cmp_ps::<_CMP_GT_OQ>(near, before));
+                let is_shown = _mm256_andnot_ps(beyond, _mm256_cmp_ps::<_CMP_GT_OQ>(near, before));
                 if _mm256_movemask_ps(is_shown) != 0 {
                     *depth = bytemuck::cast(_mm256_blendv_ps(before, near, is_shown));
                     let name = _mm256_castsi256_ps(_mm256_set1_epi32(what.name.cast_signed()));
@@ -219,8 +256,7 @@ mod tests {
             let near = numbers(k + 3, seed % 3 != 0);
             let what = Shown {
                 name: seed,
-                inside: [(all[0], &inside[0]), (all[1], &inside[1]), (all[2], &inside[2])],
-                last: (seed % 11) as i32,
+                inside: Inside { sides: [(all[0], &inside[0]), (all[1], &inside[1]), (all[2], &inside[2])], last: (seed % 11) as i32 },
                 near: ((seed % 4) as f32, &near),
             };
             let before = (numbers(k + 4, seed % 2 == 0), [7; SIDE_BY_SIDE]);
@@ -228,6 +264,7 @@ mod tests {
             Any.show(&what, &mut by_any.0, &mut by_any.1);
             avx2.run(|avx2| avx2.show(&what, &mut by_avx2.0, &mut by_avx2.1));
             assert_eq!((by_any.0.map(f32::to_bits), by_any.1), (by_avx2.0.map(f32::to_bits), by_avx2.1), "{seed}");
+            assert_eq!(Any.is_any_inside(&what.inside), avx2.run(|avx2| avx2.is_any_inside(&what.inside)), "{seed}");
             counts[by_any.1.iter().filter(|&&shown| shown != 7).count()] += 1;
 
             let (a, b) = (wholes(k + 5, 1 << 20), wholes(k + 6, 1 << 20));

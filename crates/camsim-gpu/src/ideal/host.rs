@@ -273,11 +273,15 @@ impl HostScene {
 
     fn triangles_of(&self, drawing: &Drawing<'_>, job: &[Part], chunk: &mut Chunk) {
         let mut benches = (Bench::new(), Bench::new());
-        widest!(_vectors => job.iter().for_each(|part| self.triangles(drawing, part, &mut benches, chunk)))
+        widest!(vectors => {
+            for part in job {
+                self.triangles(vectors, drawing, part, &mut benches, chunk);
+            }
+        })
     }
 
     #[inline(always)]
-    fn triangles(&self, drawing: &Drawing<'_>, part: &Part, benches: &mut Benches, chunk: &mut Chunk) {
+    fn triangles(&self, vectors: impl Vectors, drawing: &Drawing<'_>, part: &Part, benches: &mut Benches, chunk: &mut Chunk) {
         let Drawing { camera, pose, view, seen } = drawing;
         match part {
             Part::Terrain(of) => {
@@ -285,7 +289,7 @@ impl HostScene {
                 let indices = view.terrain.map_or(&[][..], |mesh| &mesh.indices[of.clone()]);
                 for triangle in indices.chunks_exact(3) {
                     let corner = |k: usize| &self.terrain[triangle[k] as usize];
-                    chunk.add(camera, [corner(0), corner(1), corner(2)], kind);
+                    chunk.add(vectors, camera, [corner(0), corner(1), corner(2)], kind);
                 }
             }
             Part::Piece { batch, level, piece, places } => {
@@ -296,8 +300,8 @@ impl HostScene {
                 for &place in &seen[places.clone()] {
                     let stands = &view.buffers.placed[place as usize];
                     match self.paints[paint].has_more {
-                        true => piece.draw_more(camera, pose, stands, model.light, kind, &mut benches.1, chunk),
-                        false => piece.draw(camera, pose, stands, kind, &mut benches.0, chunk),
+                        true => piece.draw_more(vectors, camera, pose, stands, model.light, kind, &mut benches.1, chunk),
+                        false => piece.draw(vectors, camera, pose, stands, kind, &mut benches.0, chunk),
                     }
                 }
             }

@@ -1,7 +1,8 @@
 //! Fewer triangles for the same surface: corners are drawn into neighbours, the cheapest first.
 //!
-//! What a collapse costs is how far all corners that have gone by then are from the triangles that take their place. That steers the order alone: how far
-//! a level is from the full shape is measured afterwards (`measure.rs`).
+//! What a collapse costs is how far all corners that have gone by then are from the triangles that take their place, those of the surface's border from the
+//! border: a corner of a window's opening that were drawn across it would be covered, and cost nothing. That steers the order alone: how far a level is from
+//! the full shape is measured afterwards (`measure.rs`).
 
 use std::{
     cmp::Ordering,
@@ -10,7 +11,7 @@ use std::{
 
 use glam::DVec3;
 
-use super::space::{Point, Space, distance2};
+use super::space::{Point, Space, between, distance2, from_segment2, middle};
 use crate::scene::{MeshVertex, Shape};
 
 /// Corners that have gone and are remembered by a triangle, at most: those that are farthest from it.
@@ -28,6 +29,8 @@ pub(super) struct Simplifier<const AXES: usize> {
     count: usize,
     /// Vertices at one place belong together: where attributes jump there are several.
     place_of: Vec<u32>,
+    /// Whether a place is at the full surface's border: where an edge is of one triangle alone.
+    at_border: Vec<bool>,
     /// Triangles around each place, some of them gone.
     around: Vec<Vec<u32>>,
     /// Corners that have gone, by the triangle that took their place.
@@ -35,6 +38,8 @@ pub(super) struct Simplifier<const AXES: usize> {
     /// Counts the changes around a place.
     changes: Vec<u32>,
     queue: BinaryHeap<Candidate>,
+    /// What each place was last put into the queue for, if it was: after how many changes, and its cost.
+    offered: Vec<(u32, f64)>,
 }
 
 /// A place to be drawn into another one.
@@ -95,12 +100,15 @@ impl<const AXES: usize> Simplifier<AXES> {
             gone: vec![Vec::new(); count],
             changes: vec![0; points.len()],
             queue: BinaryHeap::new(),
+            offered: vec![(u32::MAX, f64::INFINITY); points.len()],
             points,
             triangles,
             count,
+            at_border: Vec::new(),
             place_of,
             around,
         };
+        simplifier.at_border = (0..simplifier.around.len() as u32).map(|place| !simplifier.along_border(place).is_empty()).collect();
         (0..simplifier.around.len() as u32).for_each(|place| simplifier.offer(place));
         simplifier
     }
@@ -121,10 +129,10 @@ impl<const AXES: usize> Simplifier<AXES> {
                 return;
             }
             self.queue.pop();
-            if self.changes[next.from as usize] == next.changes
-                && let Some(collapse) = self.collapse(next.from, next.to)
-            {
-                self.apply(next.from, next.to, collapse);
+            if self.changes[next.from as usize] != next.changes {
+                self.offer(next.from);
+            } else if let Some(collapse) = self.collapse(next.from, next.to, f64::INFINITY) {
+                self.apply(next.from, next.to, collapse, most_m * most_m);
             }
         }
     }
@@ -145,20 +153,41 @@ impl<const AXES: usize> Simplifier<AXES> {
         found
     }
 
+    /// Whether an edge is of one triangle alone.
+    fn is_border(&self, a: u32, b: u32) -> bool {
+        let has_b = |triangle: u32| self.triangles[triangle as usize].iter().any(|&vertex| self.place(vertex) == b);
+        self.star(a).filter(|&triangle| has_b(triangle)).count() == 1
+    }
+
+    /// The neighbours of a place along the border; none within the surface.
+    fn along_border(&self, place: u32) -> Vec<u32> {
+        self.neighbours(place).into_iter().filter(|&other| self.is_border(place, other)).collect()
+    }
+
     /// Puts the cheapest collapse of a place into the queue.
     fn offer(&mut self, from: u32) {
-        let candidates = self.neighbours(from).into_iter().filter_map(|to| {
-            let cost2 = self.collapse(from, to)?.cost2;
-            Some(Candidate { cost2, from, to, changes: self.changes[from as usize] })
-        });
-        let best = candidates.max();
+        let changes = self.changes[from as usize];
+        if self.offered[from as usize].0 == changes {
+            return;
+        }
+        let mut best: Option<Candidate> = None;
+        for to in self.neighbours(from) {
+            let less2 = best.map_or(f64::INFINITY, |best| best.cost2);
+            let found = self.collapse(from, to, less2).map(|Collapse { cost2, .. }| Candidate { cost2, from, to, changes });
+            best = best.max(found);
+        }
+        self.offered[from as usize] = (changes, best.map_or(f64::INFINITY, |best| best.cost2));
         self.queue.extend(best);
     }
 
-    /// `None` where the surface would tear, vanish or fold.
-    fn collapse(&self, from: u32, to: u32) -> Option<Collapse> {
+    /// `None` where the surface would tear, vanish or fold, or where it costs more than `most2`.
+    fn collapse(&self, from: u32, to: u32, most2: f64) -> Option<Collapse> {
+        let along_border = self.along_border(from);
+        if !(along_border.is_empty() || along_border.len() == 2 && along_border.contains(&to)) {
+            return None;
+        }
         let becomes = self.partners(from, to)?;
-        let mut kept = Vec::new();
+        let (mut kept, mut border) = (Vec::new(), Vec::new());
         let mut points: Vec<u32> = becomes.iter().map(|pair| pair.0).collect();
         for triangle in self.star(from) {
             points.extend(&self.gone[triangle as usize]);
@@ -171,6 +200,10 @@ impl<const AXES: usize> Simplifier<AXES> {
                 return None;
             }
             kept.push((triangle, after));
+            let edges = [(0, 1), (1, 2), (2, 0)].into_iter();
+            border.extend(
+                edges.filter(|&(i, k)| self.is_border(self.place(before[i]), self.place(before[k]))).map(|(i, k)| [after[i], after[k]]),
+            );
         }
         if kept.is_empty() {
             return None;
@@ -181,8 +214,39 @@ impl<const AXES: usize> Simplifier<AXES> {
             };
             kept.iter().map(of).fold(f64::INFINITY, f64::min)
         };
-        let cost2 = points.iter().map(from_kept2).fold(0.0, f64::max);
+        let from_border2 = |&point: &u32| {
+            let of = |edge: &[u32; 2]| {
+                from_segment2(&self.points[point as usize], &self.points[edge[0] as usize], &self.points[edge[1] as usize])
+            };
+            border.iter().map(of).fold(f64::INFINITY, f64::min)
+        };
+        let mut cost2 = self.beside2(from, &kept);
+        for point in &points {
+            if !(cost2 <= most2 && cost2.is_finite()) {
+                return None;
+            }
+            let is_at_border = self.at_border[self.place(*point) as usize];
+            cost2 = cost2.max(if is_at_border { from_border2(point) } else { from_kept2(point) });
+        }
+        if !(cost2 <= most2 && cost2.is_finite()) {
+            return None;
+        }
         Some(Collapse { kept, cost2 })
+    }
+
+    /// How far what takes the place of a corner's triangles is from them, by a look at its middles: what is hollow would else be filled for nothing.
+    fn beside2(&self, from: u32, kept: &[(u32, [u32; 3])]) -> f64 {
+        let points = |corners: [u32; 3]| corners.map(|vertex| &self.points[vertex as usize]);
+        let from_star2 = |point: &Point<AXES>| {
+            self.star(from).map(|t| distance2(point, points(self.triangles[t as usize]))).fold(f64::INFINITY, f64::min)
+        };
+        let of = |(before, after): &(u32, [u32; 3])| {
+            let [a, b, c] = points(*after);
+            let turned = (0..3).find(|&k| self.place(self.triangles[*before as usize][k]) == from).unwrap_or(0);
+            let [first, next] = [after[turned], after[(turned + 1) % 3]].map(|vertex| &self.points[vertex as usize]);
+            from_star2(&middle(&[*a, *b, *c])).max(from_star2(&between(first, next)))
+        };
+        kept.iter().map(of).fold(0.0, f64::max)
     }
 
     /// What each vertex of a place becomes: the vertex at the other place that shares a triangle with it. `None` where that is none, or several.
@@ -216,7 +280,7 @@ impl<const AXES: usize> Simplifier<AXES> {
         was.dot(is) <= LEAST_COSINE * was.length() * is.length()
     }
 
-    fn apply(&mut self, from: u32, to: u32, collapse: Collapse) {
+    fn apply(&mut self, from: u32, to: u32, collapse: Collapse, most2: f64) {
         let star: Vec<u32> = self.star(from).collect();
         let mut points: Vec<u32> = star.iter().flat_map(|&triangle| std::mem::take(&mut self.gone[triangle as usize])).collect();
         points.extend(star.iter().flat_map(|&t| self.triangles[t as usize]).filter(|&vertex| self.place(vertex) == from));
@@ -237,7 +301,10 @@ impl<const AXES: usize> Simplifier<AXES> {
         self.remember(&points, &collapse.kept);
         for place in changed {
             self.changes[place as usize] += 1;
-            self.offer(place);
+            // What is in the queue and cheap enough will be looked at again anyway, when it is its turn.
+            if self.offered[place as usize].1 > most2 {
+                self.offer(place);
+            }
         }
     }
 

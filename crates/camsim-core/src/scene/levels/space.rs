@@ -68,6 +68,10 @@ pub(super) fn between<const AXES: usize>(a: &Point<AXES>, b: &Point<AXES>) -> Po
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
 
+pub(super) fn middle<const AXES: usize>([a, b, c]: &[Point<AXES>; 3]) -> Point<AXES> {
+    std::array::from_fn(|k| (a[k] + b[k] + c[k]) / 3.0)
+}
+
 /// Squared distance of a point from a triangle, which is a convex set: of no point between three others it is more than of the farthest one.
 pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Point<AXES>; 3]) -> f64 {
     let (e, f, v) = (minus(b, a), minus(c, a), minus(point, a));
@@ -84,7 +88,8 @@ pub(super) fn distance2<const AXES: usize>(point: &Point<AXES>, [a, b, c]: [&Poi
     [(a, b), (a, c), (b, c)].into_iter().map(|(a, b)| from_segment2(point, a, b)).fold(f64::INFINITY, f64::min)
 }
 
-fn from_segment2<const AXES: usize>(point: &Point<AXES>, a: &Point<AXES>, b: &Point<AXES>) -> f64 {
+/// Squared distance of a point from a straight line between two others.
+pub(super) fn from_segment2<const AXES: usize>(point: &Point<AXES>, a: &Point<AXES>, b: &Point<AXES>) -> f64 {
     let (along, v) = (minus(b, a), minus(point, a));
     let length2 = dot(&along, &along);
     let share = if length2 > 0.0 { (dot(&along, &v) / length2).clamp(0.0, 1.0) } else { 0.0 };

@@ -45,6 +45,10 @@ fn check_levels<const AXES: usize>(shape: &Shape) {
                 let (a, b) = (part(0), part(1));
                 let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b, a + b - 1.0] } else { [a, b, 1.0 - a - b] };
                 let corners = [0, 1, 2].map(|c| points[t[c] as usize]);
+                // What has no area, as at the poles, is no part of the surface.
+                if (0..3).any(|c| corners[c][..3] == corners[(c + 1) % 3][..3]) {
+                    continue;
+                }
                 let point = std::array::from_fn(|axis| (0..3).map(|c| weights[c] * corners[c][axis]).sum());
                 farthest = farthest.max(away_m(&points, other, &point));
             }
@@ -113,12 +117,54 @@ fn flat_walls_become_few_triangles_without_error() {
     let level = &found.levels()[1];
     assert_eq!(level.indices.len() / 3, 12);
     assert!(level.error_m < 1e-6, "{}", level.error_m);
-    // Colours that differ from cell to cell are kept.
-    for (k, vertex) in shape.vertices.iter_mut().enumerate() {
-        vertex.tint = [if k % 2 == 0 { 0.0 } else { 1.0 }, 0.5, 0.5, 1.0];
+    // Colours that differ from corner to corner are kept.
+    for (k, vertex) in (0..).zip(&mut shape.vertices) {
+        vertex.tint = [if crate::noise::pcg4d([k, 1, 2, 3])[0].is_multiple_of(2) { 0.0 } else { 1.0 }, 0.5, 0.5, 1.0];
     }
     let striped = ShapeLevels::new(&shape);
     assert!(striped.within(0.01) == 0, "{:?}", striped.levels().iter().map(|level| level.error_m).collect::<Vec<_>>());
+}
+
+/// Area of a level's triangles.
+fn area_m2(shape: &Shape, level: &ShapeLevel) -> f64 {
+    let place = |corner: u32| glam::Vec3::from(shape.vertices[corner as usize].position_m).as_dvec3();
+    level.indices.as_chunks::<3>().0.iter().map(|&[a, b, c]| 0.5 * (place(b) - place(a)).cross(place(c) - place(a)).length()).sum()
+}
+
+#[test]
+fn what_is_open_and_what_is_hollow_is_not_filled() {
+    // A wall with a window, and the same with an edge of some depth around the window and beside two gables: cells of a grid that are there, two triangles each.
+    let is_wall = |i: u32, j: u32| !((3..6).contains(&i) && (3..6).contains(&j)) && i + 12 > 2 * j && 2 * j < 19 - i;
+    for depth in [0.0, 0.5_f32] {
+        let mut shape = Shape::default();
+        let mut quad = |corners: [[f32; 3]; 4]| {
+            let first = shape.vertices.len() as u32;
+            shape.vertices.extend(corners.map(|at| MeshVertex::new(at, [0.0; 2])));
+            shape.indices.extend([0, 1, 2, 0, 2, 3].map(|k| first + k));
+        };
+        for (i, j) in (0..10).flat_map(|j| (0..8).map(move |i| (i, j))).filter(|&(i, j)| is_wall(i, j)) {
+            let at = |a: u32, b: u32, z: f32| [(i + a) as f32, (j + b) as f32, z];
+            quad([at(0, 0, 0.0), at(1, 0, 0.0), at(1, 1, 0.0), at(0, 1, 0.0)]);
+            let is_there = |a: i64, b: i64| {
+                let [x, y] = [i64::from(i) + a, i64::from(j) + b];
+                (0..8).contains(&x) && (0..10).contains(&y) && is_wall(x as u32, y as u32)
+            };
+            // Sides, where the wall ends, turned outwards.
+            let sides = [([0, -1], [0, 0], [1, 0]), ([1, 0], [1, 0], [1, 1]), ([0, 1], [1, 1], [0, 1]), ([-1, 0], [0, 1], [0, 0])];
+            for (_, from, to) in sides.into_iter().filter(|&([a, b], ..)| depth > 0.0 && !is_there(a, b)) {
+                quad([at(from[0], from[1], -depth), at(to[0], to[1], -depth), at(to[0], to[1], 0.0), at(from[0], from[1], 0.0)]);
+            }
+        }
+        let found = ShapeLevels::new(&shape);
+        let [full, level] = [0, 1].map(|k| &found.levels()[k]);
+        assert!(level.error_m < 1e-6 && 2 * level.indices.len() < full.indices.len(), "{depth}: {} {}", level.error_m, level.indices.len());
+        let (of_full, of_level) = (area_m2(&shape, full), area_m2(&shape, level));
+        assert!((of_full - of_level).abs() < 1e-4, "{depth}: {of_full} {of_level}");
+        // Coarser ones have lost little more than they were asked for.
+        for level in &found.levels()[1..] {
+            assert!(level.error_m < 3.0, "{depth}: {} m of {} triangles", level.error_m, level.indices.len() / 3);
+        }
+    }
 }
 
 #[test]

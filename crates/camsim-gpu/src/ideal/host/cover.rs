@@ -6,7 +6,7 @@ use super::{
     corners::SUBPIXELS,
     triangles::{BAND_ROWS, Chunk, Cover},
 };
-use crate::host::vectors::{Numbers, SIDE_BY_SIDE, Shown, Vectors, Wholes};
+use crate::host::vectors::{Inside, Numbers, SIDE_BY_SIDE, Shown, Vectors, Wholes};
 
 /// What a pixel shows where it shows no triangle.
 pub(super) const SKY: u32 = u32::MAX;
@@ -110,6 +110,23 @@ fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output =
     Side { across: t(0) - t(dy) * t(SUBPIXELS / 4), down: t(dx) * t(SUBPIXELS / 4), from }
 }
 
+/// Whether any place shows a triangle that nothing hides: corners from its first pixel on, and whether that one's column and row are odd; not more columns than there are side by side.
+#[inline(always)]
+pub(super) fn is_anywhere<P: Places>(vectors: impl Vectors, [a, b, c]: [[i32; 2]; 3], first: [i32; 2], last: [i32; 2]) -> bool {
+    let sides: [Side<i32>; 3] = [side(a, b), side(b, c), side(c, a)];
+    let (steps, downs) = (&P::STEPS, &P::DOWNS[first[0] as usize % 2]);
+    let of_side = |k: usize| vectors.mixed([sides[k].across, sides[k].down], [steps, downs]);
+    let adds = [of_side(0), of_side(1), of_side(2)];
+    for y in first[1]..=last[1] {
+        let (right, down) = (P::RIGHT[y as usize % 2], 4 * (y - first[1]));
+        let side = |k: usize| (sides[k].from + sides[k].down * down + sides[k].across * right, &adds[k]);
+        if vectors.is_any_inside(&Inside { sides: [side(0), side(1), side(2)], last: last[0] - first[0] }) {
+            return true;
+        }
+    }
+    false
+}
+
 /// Where a triangle is in a band.
 struct Within {
     rows: Range<usize>,
@@ -179,9 +196,10 @@ impl Band<'_> {
                 let place = row + x as usize;
                 // Rows have more numbers than pixels, so that there are enough.
                 let (Some(depth), Some(shown)) = (slots(self.depth, place), slots(self.shown, place)) else { return };
-                let inside = |k: usize| (begins[k] + sides[k].across * far, &adds[k]);
+                let side = |k: usize| (begins[k] + sides[k].across * far, &adds[k]);
+                let inside = Inside { sides: [side(0), side(1), side(2)], last: last - x };
                 let near = (inverse[1].mul_add(far as f32, begin_inverse), &adds_inverse);
-                vectors.show(&Shown { name, inside: [inside(0), inside(1), inside(2)], last: last - x, near }, depth, shown);
+                vectors.show(&Shown { name, inside, near }, depth, shown);
                 x += SIDE_BY_SIDE as i32;
             }
         }

@@ -1,5 +1,7 @@
 //! Models as the host draws them: each level of detail in pieces of a few thousand triangles, with the corners that these have.
 
+use std::collections::HashMap;
+
 use camsim_core::{
     pose::CameraPose,
     scene::{Light, MeshVertex, Shape, ShapeLevels, turned_normal},
@@ -10,7 +12,7 @@ use super::{
     corners::{CUT_PX, Camera, Corner, SUBPIXELS},
     triangles::{Chunk, Kind, MORE},
 };
-use crate::upload::PlacedShape;
+use crate::{host::vectors::Vectors, upload::PlacedShape};
 
 /// Triangles that are worked out together.
 pub(super) const TRIANGLES_A_CHUNK: usize = 4096;
@@ -59,16 +61,23 @@ impl Piece {
         levels.levels().iter().map(|level| pieces(&level.indices)).collect()
     }
 
+    /// Corners that are equal in all become one: files give each corner of a side its own, for normals and pictures that may not be there.
     fn new(shape: &Shape, indices: &[u32]) -> Self {
-        let mut used = indices.to_vec();
-        used.sort_unstable();
-        used.dedup();
-        let place = |corner: &u32| used.partition_point(|used| used < corner) as u32;
-        let normals = if shape.has_normals() { used.iter().map(|&corner| shape.normals[corner as usize]).collect() } else { Vec::new() };
-        let corners: Vec<MeshVertex> = used.iter().map(|&corner| shape.vertices[corner as usize]).collect();
-        let indices: Vec<u32> = indices.iter().map(place).collect();
-        let planes = Planes::new(&corners, &indices);
-        Self { corners, normals, indices, planes }
+        let bits = |parts: &[f32]| parts.iter().map(|part| part.to_bits()).collect::<Vec<_>>();
+        let normal = |corner: u32| if shape.has_normals() { &shape.normals[corner as usize][..] } else { &[] };
+        let mut piece = Self { corners: Vec::new(), normals: Vec::new(), indices: Vec::new(), planes: Planes::default() };
+        let mut known = HashMap::new();
+        for &index in indices {
+            let MeshVertex { position_m, uv, tint } = shape.vertices[index as usize];
+            let place = *known.entry([&position_m[..], &uv, &tint, normal(index)].map(bits)).or_insert_with(|| {
+                piece.corners.push(shape.vertices[index as usize]);
+                piece.normals.extend(shape.normals.get(index as usize).filter(|_| shape.has_normals()));
+                piece.corners.len() as u32 - 1
+            });
+            piece.indices.push(place);
+        }
+        piece.planes = Planes::new(&piece.corners, &piece.indices);
+        piece
     }
 
     /// How many triangles it has.
@@ -78,7 +87,16 @@ impl Piece {
 
     /// Adds it where it stands.
     #[inline(always)]
-    pub fn draw(&self, camera: &Camera, pose: &CameraPose, stands: &PlacedShape, kind: Kind, bench: &mut Bench<2>, chunk: &mut Chunk) {
+    pub fn draw(
+        &self,
+        vectors: impl Vectors,
+        camera: &Camera,
+        pose: &CameraPose,
+        stands: &PlacedShape,
+        kind: Kind,
+        bench: &mut Bench<2>,
+        chunk: &mut Chunk,
+    ) {
         let place = Place::new(pose, stands);
         self.look(camera, &place, kind, bench);
         // Loops, here and below: what iterators call may be compiled without the vectors that this is.
@@ -87,13 +105,14 @@ impl Piece {
                 bench.corners[k] = camera.corner(place.in_camera_m(corner.position_m), corner.uv);
             }
         }
-        self.add(camera, bench, kind, chunk);
+        self.add(vectors, camera, bench, kind, chunk);
     }
 
     /// The same with tints of its corners, in a light that falls on it.
     #[inline(always)]
     pub fn draw_more(
         &self,
+        vectors: impl Vectors,
         camera: &Camera,
         pose: &CameraPose,
         stands: &PlacedShape,
@@ -115,7 +134,7 @@ impl Piece {
                 bench.corners[k] = camera.corner(place.in_camera_m(corner.position_m), [u, v, r, g, b, sun, down]);
             }
         }
-        self.add(camera, bench, kind, chunk);
+        self.add(vectors, camera, bench, kind, chunk);
     }
 
     /// Which triangles may be seen, and which corners are asked for by them.
@@ -137,11 +156,11 @@ impl Piece {
     }
 
     #[inline(always)]
-    fn add<const N: usize>(&self, camera: &Camera, bench: &Bench<N>, kind: Kind, chunk: &mut Chunk) {
+    fn add<const N: usize>(&self, vectors: impl Vectors, camera: &Camera, bench: &Bench<N>, kind: Kind, chunk: &mut Chunk) {
         for (triangle, is_seen) in self.indices.as_chunks::<3>().0.iter().zip(&bench.is_seen) {
             if *is_seen {
                 let corner = |k: usize| &bench.corners[triangle[k] as usize];
-                chunk.add(camera, [corner(0), corner(1), corner(2)], kind);
+                chunk.add(vectors, camera, [corner(0), corner(1), corner(2)], kind);
             }
         }
     }
@@ -260,7 +279,7 @@ mod tests {
     use glam::DQuat;
 
     use super::*;
-    use crate::layout::IdealCamera;
+    use crate::{host::vectors::Any, layout::IdealCamera};
 
     fn random(seed: u32, k: u32) -> [f64; 4] {
         pcg4d([seed, k, 5, 9]).map(|bits| f64::from(bits) / 2_f64.powi(32) - 0.5)
@@ -296,7 +315,7 @@ mod tests {
         let stands = PlacedShape { origin_ned_m: DVec3::new(3.0, -2.0, 1.0), ned_from_shape, stretch: 1.3 };
         let (mut bench, mut chunk) = (Bench::new(), Chunk::default());
         let kind = Kind { paint: 0, one_sided: true, sky: None };
-        piece.draw(camera, pose, &stands, kind, &mut bench, &mut chunk);
+        piece.draw(Any, camera, pose, &stands, kind, &mut bench, &mut chunk);
         let left_out = bench.is_seen.iter().filter(|seen| !**seen).count();
         if all {
             chunk.clear();
@@ -305,7 +324,7 @@ mod tests {
                 bench.corners[k] = camera.corner(place.in_camera_m(corner.position_m), corner.uv);
             }
             bench.is_seen.fill(true);
-            piece.add(camera, &bench, kind, &mut chunk);
+            piece.add(Any, camera, &bench, kind, &mut chunk);
         }
         (chunk.covers.iter().map(|cover| cover.at).collect(), left_out)
     }

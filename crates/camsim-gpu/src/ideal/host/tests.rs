@@ -10,7 +10,7 @@ use super::{
     triangles::{BAND_ROWS, Chunk, Kind},
 };
 use crate::{
-    host::vectors::{Vectors, widest},
+    host::vectors::{Any, Vectors, widest},
     layout::IdealCamera,
 };
 
@@ -58,7 +58,7 @@ fn covered_by<P: Places>(places: P, camera: &Camera, triangles: &[[Corner<2>; 3]
     let (mut chunk, mut kinds) = (Chunk::default(), [0; 2]);
     for [a, b, c] in triangles {
         chunk.clear();
-        chunk.add(camera, [a, b, c], kind);
+        chunk.add(Any, camera, [a, b, c], kind);
         chunk.sort(height.div_ceil(rows));
         kinds = [kinds[0] + chunk.covers.len() - chunk.large.len(), kinds[1] + chunk.large.len()];
         for number in (0..height.div_ceil(rows)).filter(|&number| !chunk.of_band(number).is_empty()) {
@@ -116,6 +116,22 @@ fn walls() -> [Wall; 6] {
 fn assert_covered_once(name: &str, counts: &[u32]) {
     let other = counts.iter().filter(|&&count| count != 1).count();
     assert_eq!(other, 0, "{name}: of {} places", counts.len());
+}
+
+/// Of models those are left out that no place shows: what is left covers the same places.
+#[test]
+fn small_triangles_of_models_are_left_out_where_nothing_shows_them() {
+    let model = Kind { paint: 1, ..KIND };
+    let of_samples = Camera { size_px: SIZE_PX, ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.of_samples() };
+    for (name, triangles, _) in walls() {
+        let (ground, model_, kinds) = (covered(&triangles, KIND), covered(&triangles, model), [KIND, model]);
+        assert_eq!(ground.0, model_.0, "{name}");
+        let [all, left] = kinds.map(|kind| covered_by(Samples, &of_samples, &triangles, kind));
+        assert_eq!(all.0, left.0, "{name}, by samples");
+        if name == "tiny" {
+            assert!(4 * model_.1[0] < 3 * ground.1[0] && 4 * left.1[0] < 3 * all.1[0], "{:?} {:?}", model_.1, ground.1);
+        }
+    }
 }
 
 #[test]
@@ -232,7 +248,7 @@ fn what_is_on_thin_triangles_stays_near_what_their_corners_have() {
         };
         let [a, b, c] = [corner(0.0, 0.0, 10.0), corner(long, 0.0, 14.0), corner(0.5 * long, wide, 11.0)];
         let mut chunk = Chunk::default();
-        chunk.add(&camera, [&a, &b, &c], KIND);
+        chunk.add(Any, &camera, [&a, &b, &c], KIND);
         chunk.sort(height.div_ceil(BAND_ROWS));
         large += chunk.large.len();
         let (nearest, farthest) = (0.05 / 10.0, 0.05 / 14.0);

@@ -1,13 +1,19 @@
 //! Triangles as they are drawn: which pixels they may cover, and what is on them as planes over the picture.
 
 use super::{
+    GROUND,
     corners::{Camera, Corner, SUBPIXEL_BITS, SUBPIXELS},
-    cover::SMALL_PX,
+    cover::{self, Pixels, SMALL_PX, Samples},
 };
-use crate::host::lanes::{higher, lower};
+use crate::host::{
+    lanes::{higher, lower},
+    vectors::{SIDE_BY_SIDE, Vectors},
+};
 
 /// Triangles less wide than this, steps of the grid, have planes by their corners on the grid.
 const THIN_STEPS: i64 = 8;
+/// Models' triangles of a smaller area, twice that in steps of the grid, are left out where no place shows them: a pixel's, as many of them are smaller.
+const SMALLER_STEPS2: i64 = 2 * (SUBPIXELS * SUBPIXELS) as i64;
 /// Rows of the picture that are drawn together.
 pub(super) const BAND_ROWS: usize = 32;
 /// Numbers on a triangle besides texture coordinates, where it has any: a tint, and what light needs of the normal (towards the sun, down).
@@ -134,26 +140,26 @@ impl Chunk {
 
     /// Adds a triangle, or what of it is within.
     #[inline(always)]
-    pub fn add<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    pub fn add<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
         if corners.iter().all(|corner| corner.is_within) {
-            return self.add_within(camera, corners, kind);
+            return self.add_within(vectors, camera, corners, kind);
         }
-        self.add_cut(camera, corners, kind);
+        self.add_cut(vectors, camera, corners, kind);
     }
 
     #[cold]
-    fn add_cut<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    fn add_cut<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
         if corners.iter().all(|corner| corner.in_camera_m[2] < camera.uniforms.near_m) {
             return;
         }
         let polygon = camera.cut(corners);
         for pair in polygon.windows(2).skip(1) {
-            self.add_within(camera, [&polygon[0], &pair[0], &pair[1]], kind);
+            self.add_within(vectors, camera, [&polygon[0], &pair[0], &pair[1]], kind);
         }
     }
 
     #[inline(always)]
-    fn add_within<const N: usize>(&mut self, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
+    fn add_within<const N: usize>(&mut self, vectors: impl Vectors, camera: &Camera, corners: [&Corner<N>; 3], kind: Kind) {
         let [a, b, c] = corners;
         let [ax, ay, bx, by, cx, cy] = [a.at[0], a.at[1], b.at[0], b.at[1], c.at[0], c.at[1]];
         let (left, right) = (ax.min(bx).min(cx), ax.max(bx).max(cx));
@@ -175,6 +181,9 @@ impl Chunk {
         let at = [place(a), place(b), place(c)];
         let is_near = |[x, y]: [i32; 2]| x.abs().max(y.abs()) <= SMALL_PX * SUBPIXELS;
         let is_small = is_near(at[0]) & is_near(at[1]) & is_near(at[2]);
+        if kind.paint != GROUND && is_small && area2.abs() < SMALLER_STEPS2 && !is_anywhere(vectors, camera, at, first, last) {
+            return;
+        }
         // Coverage is of corners on the grid, but what is on the triangle is of where they are: half a step of the grid is much towards a horizon. Not where it is next to as much as the
         // triangle is wide: what is on that would go far beyond what its corners have.
         let reach = |to: &Corner<N>| i64::from((to.at[0] - a.at[0]).abs() + (to.at[1] - a.at[1]).abs());
@@ -264,4 +273,15 @@ impl Chunk {
         self.large.push([plane(inverse), times_inverse(0), times_inverse(1)]);
         self.large.len() as u32 - 1
     }
+}
+
+/// Whether any place that a camera's pictures have may show a small model's triangle: its pixels, or four samples a pixel.
+#[inline(always)]
+fn is_anywhere(vectors: impl Vectors, camera: &Camera, at: [[i32; 2]; 3], first: [i32; 2], last: [i32; 2]) -> bool {
+    let is_wide = last[0] - first[0] >= SIDE_BY_SIDE as i32;
+    is_wide
+        || match camera.beside {
+            0 => cover::is_anywhere::<Pixels>(vectors, at, first, last),
+            _ => cover::is_anywhere::<Samples>(vectors, at, first, last),
+        }
 }
