@@ -110,7 +110,7 @@ fn side<T: From<i32> + Copy + std::ops::Mul<Output = T> + std::ops::Sub<Output =
     Side { across: t(0) - t(dy) * t(SUBPIXELS / 4), down: t(dx) * t(SUBPIXELS / 4), from }
 }
 
-/// Whether any place shows a triangle that nothing hides: corners from its first pixel on, and whether that one's column and row are odd; not more columns than there are side by side.
+/// Whether any place shows a triangle that nothing hides, of not more columns than there are side by side: its corners from its first pixel on, and its first and last pixels.
 #[inline(always)]
 pub(super) fn is_anywhere<P: Places>(vectors: impl Vectors, [a, b, c]: [[i32; 2]; 3], first: [i32; 2], last: [i32; 2]) -> bool {
     let sides: [Side<i32>; 3] = [side(a, b), side(b, c), side(c, a)];
