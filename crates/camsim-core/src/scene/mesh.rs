@@ -1,6 +1,6 @@
 //! Textured triangle meshes: a shape, what it is covered with, and where it stands. Many meshes may share one shape.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use glam::{DMat3, DVec3};
 
@@ -47,6 +47,19 @@ impl Shape {
     #[must_use]
     pub fn has_normals(&self) -> bool {
         !self.normals.is_empty() && self.normals.len() == self.vertices.len()
+    }
+
+    /// For each corner the first that is equal to it in all: files give each side corners of its own, for normals and pictures that may not be there.
+    #[must_use]
+    pub fn first_equals(&self) -> Vec<u32> {
+        // 0 and -0 are one number.
+        let bits = |values: &[f32]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u32>>();
+        let normal = |i: u32| self.normals.get(i as usize).map_or_else(Vec::new, |normal| bits(normal));
+        let mut known = HashMap::new();
+        let corners = (0..).zip(&self.vertices);
+        corners
+            .map(|(i, MeshVertex { position_m, uv, tint })| *known.entry((bits(position_m), bits(uv), bits(tint), normal(i))).or_insert(i))
+            .collect()
     }
 
     /// Smallest box around the corners, in the shape's own axes.

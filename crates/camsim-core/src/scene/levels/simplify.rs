@@ -38,7 +38,7 @@ pub(super) struct Simplifier<const AXES: usize> {
     /// Counts the changes around a place.
     changes: Vec<u32>,
     queue: BinaryHeap<Candidate>,
-    /// What each place was last put into the queue for, if it was: after how many changes, and its cost.
+    /// After how many changes each place was last looked at, and the cost that it is in the queue for; infinite if it is not.
     offered: Vec<(u32, f64)>,
 }
 
@@ -76,14 +76,10 @@ struct Collapse {
 impl<const AXES: usize> Simplifier<AXES> {
     pub fn new(shape: &Shape) -> Self {
         let points = Space::of(shape).points(shape);
-        let (mut same, mut places) = (HashMap::new(), HashMap::new());
-        let bits = |values: &[f32]| values.iter().map(|value| (value + 0.0).to_bits()).collect::<Vec<u32>>();
-        let normal = |i: u32| shape.normals.get(i as usize).map_or_else(Vec::new, |normal| bits(normal));
-        let first: Vec<u32> = (0..)
-            .zip(&shape.vertices)
-            .map(|(i, MeshVertex { position_m, uv, tint })| *same.entry((bits(position_m), bits(uv), bits(tint), normal(i))).or_insert(i))
-            .collect();
-        let place_of: Vec<u32> = (0..).zip(&shape.vertices).map(|(i, v)| *places.entry(bits(&v.position_m)).or_insert(i)).collect();
+        let first = shape.first_equals();
+        let mut places = HashMap::new();
+        let place = |vertex: &MeshVertex| vertex.position_m.map(|part| (part + 0.0).to_bits());
+        let place_of: Vec<u32> = (0..).zip(&shape.vertices).map(|(i, vertex)| *places.entry(place(vertex)).or_insert(i)).collect();
         let triangles: Vec<[u32; 3]> = shape
             .indices
             .chunks_exact(3)
@@ -133,6 +129,8 @@ impl<const AXES: usize> Simplifier<AXES> {
                 self.offer(next.from);
             } else if let Some(collapse) = self.collapse(next.from, next.to, f64::INFINITY) {
                 self.apply(next.from, next.to, collapse, most_m * most_m);
+            } else {
+                self.offered[next.from as usize].1 = f64::INFINITY;
             }
         }
     }

@@ -160,10 +160,6 @@ fn what_is_open_and_what_is_hollow_is_not_filled() {
         assert!(level.error_m < 1e-6 && 2 * level.indices.len() < full.indices.len(), "{depth}: {} {}", level.error_m, level.indices.len());
         let (of_full, of_level) = (area_m2(&shape, full), area_m2(&shape, level));
         assert!((of_full - of_level).abs() < 1e-4, "{depth}: {of_full} {of_level}");
-        // Coarser ones have lost little more than they were asked for.
-        for level in &found.levels()[1..] {
-            assert!(level.error_m < 3.0, "{depth}: {} m of {} triangles", level.error_m, level.indices.len() / 3);
-        }
     }
 }
 

@@ -1,7 +1,5 @@
 //! Models as the host draws them: each level of detail in pieces of a few thousand triangles, with the corners that these have.
 
-use std::collections::HashMap;
-
 use camsim_core::{
     pose::CameraPose,
     scene::{Light, MeshVertex, Shape, ShapeLevels, turned_normal},
@@ -57,27 +55,22 @@ pub(super) struct Bench<const N: usize> {
 impl Piece {
     /// Those of a shape, by level of detail.
     pub fn of_levels(shape: &Shape, levels: &ShapeLevels) -> Vec<Vec<Self>> {
-        let pieces = |indices: &[u32]| indices.chunks(3 * TRIANGLES_A_CHUNK).map(|some| Self::new(shape, some)).collect();
+        let first = shape.first_equals();
+        let pieces = |indices: &[u32]| indices.chunks(3 * TRIANGLES_A_CHUNK).map(|some| Self::new(shape, &first, some)).collect();
         levels.levels().iter().map(|level| pieces(&level.indices)).collect()
     }
 
-    /// Corners that are equal in all become one: files give each corner of a side its own, for normals and pictures that may not be there.
-    fn new(shape: &Shape, indices: &[u32]) -> Self {
-        let bits = |parts: &[f32]| parts.iter().map(|part| part.to_bits()).collect::<Vec<_>>();
-        let normal = |corner: u32| if shape.has_normals() { &shape.normals[corner as usize][..] } else { &[] };
-        let mut piece = Self { corners: Vec::new(), normals: Vec::new(), indices: Vec::new(), planes: Planes::default() };
-        let mut known = HashMap::new();
-        for &index in indices {
-            let MeshVertex { position_m, uv, tint } = shape.vertices[index as usize];
-            let place = *known.entry([&position_m[..], &uv, &tint, normal(index)].map(bits)).or_insert_with(|| {
-                piece.corners.push(shape.vertices[index as usize]);
-                piece.normals.extend(shape.normals.get(index as usize).filter(|_| shape.has_normals()));
-                piece.corners.len() as u32 - 1
-            });
-            piece.indices.push(place);
-        }
-        piece.planes = Planes::new(&piece.corners, &piece.indices);
-        piece
+    /// `first` are a shape's [`Shape::first_equals`].
+    fn new(shape: &Shape, first: &[u32], indices: &[u32]) -> Self {
+        let mut used: Vec<u32> = indices.iter().map(|&corner| first[corner as usize]).collect();
+        used.sort_unstable();
+        used.dedup();
+        let place = |&corner: &u32| used.partition_point(|&used| used < first[corner as usize]) as u32;
+        let normals = if shape.has_normals() { used.iter().map(|&corner| shape.normals[corner as usize]).collect() } else { Vec::new() };
+        let corners: Vec<MeshVertex> = used.iter().map(|&corner| shape.vertices[corner as usize]).collect();
+        let indices: Vec<u32> = indices.iter().map(place).collect();
+        let planes = Planes::new(&corners, &indices);
+        Self { corners, normals, indices, planes }
     }
 
     /// How many triangles it has.
@@ -307,7 +300,7 @@ mod tests {
             }
         }
         let indices = shape.indices.clone();
-        let piece = Piece::new(&shape, &indices);
+        let piece = Piece::new(&shape, &shape.first_equals(), &indices);
         // Stretched all over, hardly, much, and pressed flat.
         let sides =
             [DVec3::splat(2.0), DVec3::new(1.0, 1.3, 0.8), DVec3::new(1.0, 5.0, 0.3), DVec3::new(1.0, 1.0, 0.0)][seed as usize / 3 % 4];

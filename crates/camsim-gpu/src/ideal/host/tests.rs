@@ -124,12 +124,12 @@ fn small_triangles_of_models_are_left_out_where_nothing_shows_them() {
     let model = Kind { paint: 1, ..KIND };
     let of_samples = Camera { size_px: SIZE_PX, ..Camera { focal_px: [50.0; 2], principal_px: [79.5, 59.5], ..camera() }.of_samples() };
     for (name, triangles, _) in walls() {
-        let (ground, model_, kinds) = (covered(&triangles, KIND), covered(&triangles, model), [KIND, model]);
-        assert_eq!(ground.0, model_.0, "{name}");
+        let (on_ground, on_model, kinds) = (covered(&triangles, KIND), covered(&triangles, model), [KIND, model]);
+        assert_eq!(on_ground.0, on_model.0, "{name}");
         let [all, left] = kinds.map(|kind| covered_by(Samples, &of_samples, &triangles, kind));
         assert_eq!(all.0, left.0, "{name}, by samples");
         if name == "tiny" {
-            assert!(4 * model_.1[0] < 3 * ground.1[0] && 4 * left.1[0] < 3 * all.1[0], "{:?} {:?}", model_.1, ground.1);
+            assert!(4 * on_model.1[0] < 3 * on_ground.1[0] && 4 * left.1[0] < 3 * all.1[0], "{:?} {:?}", on_model.1, on_ground.1);
         }
     }
 }
