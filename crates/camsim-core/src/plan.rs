@@ -447,6 +447,12 @@ fn zoom_at(track: &[(f64, f64)], t_s: f64) -> f64 {
 }
 
 impl IdealGeometry {
+    /// How many of its pixels are as long as one of a camera's, where that one's lens leaves it as it is.
+    #[must_use]
+    pub fn scale(&self, camera: &CameraModel) -> f64 {
+        self.focal_px.x / camera.focal_px.x
+    }
+
     /// `[u_min, u_max, v_min, v_max]` of the pixel area.
     #[must_use]
     pub fn tangents(&self) -> [f64; 4] {

@@ -8,6 +8,7 @@ mod common;
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use camsim_core::{
+    plan::Planner,
     pose::CameraPose,
     reference::{Oracle, RenderOptions},
     scenario::{Auto, Channel, MountSpec},
@@ -189,4 +190,21 @@ fn a_level_of_detail_is_as_far_from_the_oracle_as_its_bound_says() {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn a_level_of_detail_in_light_is_as_far_from_the_oracle_as_its_bound_says() {
     check("light", Some(Light::new(2.3, 0.6, 0.7, 0.3)));
+}
+
+#[test]
+fn models_may_be_as_far_beside_in_the_picture_however_fine_the_ideal_frame_is() {
+    // Pixels twice as high as wide: they bound what is across and what is down alike.
+    for (ideal_scale, times) in [(0.5, 1.0), (1.0, 1.0), (2.0, 2.0)] {
+        let mut scenario = scenario();
+        scenario.camera.size_px = SIZE_PX;
+        scenario.camera.focal_px = [FOCAL_PX, 0.5 * FOCAL_PX];
+        scenario.quality.ideal_scale = Auto::Value(ideal_scale);
+        scenario.quality.max_terrain_error_px = ALLOWED_PX;
+        let sequence = sequence(scenario, steady(HEIGHT_M, 0.0, DVec3::ZERO, DVec3::ZERO), scene(None));
+        let plan = Planner::new(sequence.clone(), &[Channel::Color], 16_384).expect("a planner").plan(0).expect("a plan");
+        let tolerance = plan.model_tolerance(&sequence.scenario.quality);
+        assert!((tolerance.focal_px - ideal_scale * FOCAL_PX).abs() < 1e-9, "{ideal_scale}: {}", tolerance.focal_px);
+        assert!((tolerance.error_px - times * 0.25 * ALLOWED_PX).abs() < 1e-12, "{ideal_scale}: {}", tolerance.error_px);
+    }
 }

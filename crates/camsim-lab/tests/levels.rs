@@ -65,7 +65,7 @@ fn grey_levels_are_as_predicted_and_within_the_tolerance() {
             let predicted = &plan.predicted;
             let predicted_dn = predicted.resampling_dn.hypot(predicted.blur_dn);
             let ratio = measured_dn / predicted_dn;
-            let scale = plan.ideal.focal_px.x / plan.camera.focal_px.x;
+            let scale = plan.ideal.scale(&plan.camera);
             eprintln!(
                 "{:<22} {max_error_dn:>4} dn: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} and {:.3}), ratio {ratio:.2}; scale {scale:.2}, {:?} {:?}",
                 case.name, predicted.resampling_dn, predicted.blur_dn, plan.surface_reads, plan.taps

@@ -86,7 +86,7 @@ pub(super) struct LevelOfDetail {
 struct Models {
     #[serde(flatten)]
     detail: ModelDetail,
-    /// Bound on how far what is drawn is from the full models, px of the ideal frame.
+    /// Bound on how far what is drawn is from the full models, px of the picture.
     tolerance_px: f64,
 }
 
@@ -202,7 +202,7 @@ fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
     let scene = &sequence.scene;
     let tolerance = plan.model_tolerance(&sequence.scenario.quality);
     let detail = || ModelDetail::new(scene, &SceneLevels::new(scene), &plan.ideal_pose(), &tolerance);
-    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px / plan.ideal_px_a_pixel().max(1.0) })
+    (!scene.meshes.is_empty()).then(|| Models { detail: detail(), tolerance_px: tolerance.error_px / plan.ideal.scale(&plan.camera) })
 }
 
 /// The choice that the ideal pass makes.

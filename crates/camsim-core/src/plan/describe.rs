@@ -191,7 +191,7 @@ impl FramePlan {
             surface_reads: self.surface_reads,
             samples_a_pixel: self.samples_a_pixel,
             taps: self.taps,
-            ideal_scale: self.ideal.focal_px.x / self.camera.focal_px.x,
+            ideal_scale: self.ideal.scale(&self.camera),
             motion: self.motion,
             terrain_error_px: self.terrain_error_px,
             predicted: &self.predicted,

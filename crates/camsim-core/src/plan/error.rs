@@ -348,7 +348,7 @@ impl<'a> Truths<'a> {
 
     /// Side of the part of the picture that a probe stands for, ideal pixels.
     fn probe_px(&self) -> f64 {
-        self.trial.ideal.focal_px.x / self.reach.camera.focal_px.x * self.reach.probe_px
+        self.trial.ideal.scale(&self.reach.camera) * self.reach.probe_px
     }
 
     /// Mean squared error over the picture by skylines that are elsewhere in an ideal frame, of the linear range; `gain` is that of a pixel.

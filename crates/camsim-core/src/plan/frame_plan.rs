@@ -152,16 +152,10 @@ impl FramePlan {
         LevelTolerance {
             focal_px: self.ideal.focal_px.max_element(),
             tangents: self.tangents(),
-            error_px: MODEL_SHARE * self.terrain_error_px * self.ideal_px_a_pixel().max(1.0),
+            error_px: MODEL_SHARE * self.terrain_error_px * self.ideal.scale(&self.camera).max(1.0),
             travel_m: self.motion.travel_m,
             parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
         }
-    }
-
-    /// How many of the ideal frame's pixels are as long as one of the picture, where the lens leaves it as it is.
-    #[must_use]
-    pub fn ideal_px_a_pixel(&self) -> f64 {
-        self.ideal.focal_px.max_element() / self.camera.focal_px.min_element()
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.

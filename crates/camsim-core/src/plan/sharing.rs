@@ -288,7 +288,7 @@ impl Planner {
         let keys = [KeyFrame { t_s: key_s, pose: path.pose(key_s) }];
         let view = |frame: u64| bounds::view(reach, path, &self.shutter, self.stamp_s(frame), key_s, &keys, &self.surfaces, None);
         let view = frames.clone().map(view).reduce(View::and)?;
-        let scale = own.ideal.focal_px.x / own.camera.focal_px.x;
+        let scale = own.ideal.scale(&own.camera);
         let area = |[width, height]: [u32; 2]| f64::from(width) * f64::from(height);
         let times = area(view.pixels(&reach.camera, scale).size_px) / area(own.ideal.size_px);
         let count = (frames.end - frames.start) as f64;

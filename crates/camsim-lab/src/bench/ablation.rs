@@ -102,7 +102,7 @@ fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
     };
     QualitySpec {
-        ideal_scale: Auto::Value(plan.ideal.focal_px.x / plan.camera.focal_px.x),
+        ideal_scale: Auto::Value(plan.ideal.scale(&plan.camera)),
         ideal_samples: Auto::Value(plan.samples_a_pixel),
         footprint_taps: Auto::Value(taps),
         blur_samples: plan.blur.map_or(Auto::Auto, |blur| Auto::Value(blur.max_samples * blur.stretches())),

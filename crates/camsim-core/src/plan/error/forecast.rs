@@ -144,7 +144,7 @@ impl Forecast<'_> {
 
     /// What it costs that sources are beside their place, RMS over the picture, 1/255 of the linear range.
     fn displaced_dn(&self, case: &Case<'_>, way: Way, missed: Missed) -> f64 {
-        let scale = case.ideal.focal_px.x / case.reach.camera.focal_px.x;
+        let scale = case.ideal.scale(&case.reach.camera);
         // What is farther off than all that count is at silhouettes.
         let most_px = self.largest(|i, _, _| self.error_px(i, way));
         let between = between_kind(way).map(|kind| (kind, &self.between().0));

@@ -126,7 +126,7 @@ impl Planner {
         if !grew {
             return Ok(plan.ideal);
         }
-        let scale = plan.ideal.focal_px.x / plan.camera.focal_px.x;
+        let scale = plan.ideal.scale(&plan.camera);
         Ok(look.geometry(&[look.key()], scale, look.demanded))
     }
 }
