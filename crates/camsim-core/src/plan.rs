@@ -17,6 +17,7 @@ use crate::{
     temporal::IdealGeometry,
 };
 
+mod around;
 mod borders;
 mod bounds;
 mod contours;
@@ -49,6 +50,7 @@ mod resample;
 mod rounding;
 mod sharing;
 mod sight;
+mod skyline;
 mod stages;
 mod stairs;
 pub(crate) mod surface_filter;
@@ -63,7 +65,7 @@ pub use contours::Contours;
 pub use describe::PlanSummary;
 pub use edges::EdgeStage;
 pub(crate) use error::MOST_VOID_SHARE;
-pub use error::{ErrorMap, ErrorPlace, PlaceError};
+pub use error::{ErrorMap, ErrorPlace, Ground, PlaceError};
 pub use frame_plan::{FramePlan, Motion, Skip};
 pub use holes::Holes;
 pub use keys::{KeyFrame, MAX_KEYS, SIZE_QUANTUM_PX};
@@ -101,8 +103,8 @@ pub struct Planner {
     max_side_px: u32,
     max_ideal_px: u64,
     /// What the probes of the last frames see around them.
-    around: Kept<Vec<contours::Around>>,
-    around_by_half: Kept<Vec<contours::Around>>,
+    surroundings: Kept<around::Surroundings>,
+    surroundings_by_half: Kept<around::Surroundings>,
     /// The last groups of frames that were looked at.
     groups: Kept<sharing::Group>,
     /// The last plan of a frame by itself: whoever asks whether it can be planned asks for it again.
@@ -168,8 +170,8 @@ impl Planner {
             truth,
             max_side_px,
             max_ideal_px,
-            around: Kept::new(FRAMES_KEPT),
-            around_by_half: Kept::new(FRAMES_KEPT),
+            surroundings: Kept::new(FRAMES_KEPT),
+            surroundings_by_half: Kept::new(FRAMES_KEPT),
             groups: Kept::new(GROUPS_KEPT),
             last: Kept::new(1),
         })
@@ -287,8 +289,10 @@ impl Planner {
             shown: &shown,
             most_displaced_dn: levels::for_displaced_dn(
                 quality,
+                &self.sequence.scene,
                 expected.total_dn().hypot(picture.silhouettes_dn()).hypot(scenery.layers_dn()),
             ),
+            outlook: scenery.outlook.as_ref(),
             silhouettes: picture.silhouettes,
             layers: scenery.layers,
             silhouettes_in_view: scenery.reason_for_none.is_none(),

@@ -72,7 +72,7 @@ pub(super) struct LevelOfDetail {
     pub(super) triangles: u64,
     /// Triangles in sight that are left out because they face away.
     pub(super) away: u64,
-    /// Bound on how far the drawn terrain is from the full one, px of the ideal frame.
+    /// Bound on how far the drawn terrain is from the full one, px of the picture.
     pub(super) max_error_px: f64,
     pub(super) tolerance_px: f64,
     /// How far depth may be off for it where the camera looks straight down, as a share of it.
@@ -168,7 +168,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     if let Some(LevelOfDetail { triangles, away, max_error_px, tolerance_px, depth_share, triangle_bytes }) = level_of_detail {
         console.line("terrain in this frame")?;
-        console.line(format_args!("  {triangles} triangles, off by at most {max_error_px:.3} px of {tolerance_px} allowed"))?;
+        console.line(format_args!(
+            "  {triangles} triangles, off by at most {max_error_px:.3} px of the picture, of {tolerance_px:.3} allowed"
+        ))?;
         console.line(format_args!("  the depth of what is seen from straight above is off by at most {depth_share:.1e} of it"))?;
         if away > 0 {
             console.line(format_args!("  {away} more face away and are not drawn: from above they are hidden"))?;
@@ -208,15 +210,15 @@ fn models(sequence: &Sequence, plan: &FramePlan) -> Option<Models> {
 /// The choice that the ideal pass makes.
 pub(super) fn level_of_detail(sequence: &Sequence, plan: &FramePlan) -> Option<LevelOfDetail> {
     let terrain = sequence.scene.terrain.as_ref()?;
-    let tolerance_px = plan.terrain_error_px;
+    let scale = plan.ideal.scale(&plan.camera);
     let placed = detail(terrain, plan).mesh_to_draw().placed(terrain, plan.ideal_pose().position_ned_m.round());
     let (lod, triangle_bytes) = (placed.lod, placed.bytes());
-    let depth_share = tolerance_px / plan.ideal.focal_px.max_element();
+    let depth_share = plan.terrain_error_px / plan.ideal.focal_px.max_element();
     Some(LevelOfDetail {
         triangles: lod.triangles,
         away: lod.away,
-        max_error_px: lod.max_error_px,
-        tolerance_px,
+        max_error_px: lod.max_error_px / scale,
+        tolerance_px: plan.terrain_error_px / scale,
         depth_share,
         triangle_bytes,
     })

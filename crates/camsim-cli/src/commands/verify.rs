@@ -150,7 +150,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         console
             .line(format_args!("errors of source coordinates in px of the ideal frame; tolerance {tolerance_px} px (99th percentile)"))?;
         console.line(format_args!(
-            "terrain off: bound on how far the drawn terrain is from the full one, px; quality.max_terrain_error_px allows {allowed_px}"
+            "terrain off: bound on how far the drawn terrain is from the full one, px of the picture; quality.max_terrain_error_px allows {allowed_px}"
         ))?;
         console.line(HEADER)?;
     }
@@ -333,8 +333,8 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         "{frame:>6} | {:>10.2e} {:>10.2e} {:>10.2e} {:>10.2e} | {share:>12.1} % {:>10.2e} {:>10.2e} | {falsely_valid:>13} {missing:>8} | {terrain_off:>11} | {verdict}{why}",
         predicted.total_px, smooth.p99_px, smooth.rms_px, smooth.max_px, silhouettes.rms_px, silhouettes.max_px
     ))?;
-    let Predicted { resampling_dn, blur_dn, displaced_dn, layers, holes, .. } = predicted;
-    let layers_dn = layers.map_or(0.0, |layers| layers.error_dn);
+    let Predicted { resampling_dn, blur_dn, displaced_dn, ground, layers, holes, .. } = predicted;
+    let (surface_dn, layers_dn) = (ground.map_or(0.0, |ground| ground.surface_dn), layers.map_or(0.0, |layers| layers.error_dn));
     let expected = holes.map_or_else(|| "nobody looks for them".to_owned(), |holes| format!("predicted {:.4} %", 100.0 * holes.share));
     console.line(format_args!(
         "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
@@ -353,7 +353,7 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         };
         console.line(format_args!(
             "       | in all {rms_dn:.3}/255 (RMS), predicted {predicted_dn:.3}: quality.max_error_dn = {tolerance_dn} is {verdict}; without silhouettes predicted {}",
-            estimate(resampling_dn.hypot(*blur_dn).hypot(*displaced_dn).hypot(layers_dn))
+            estimate(resampling_dn.hypot(*blur_dn).hypot(*displaced_dn).hypot(surface_dn).hypot(layers_dn))
         ))?;
         for cause in &verified.not_in_the_picture {
             console.line(format_args!("       | not in that prediction: {cause}"))?;

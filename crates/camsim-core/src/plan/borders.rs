@@ -14,7 +14,7 @@ use std::{
 use glam::DVec2;
 
 use super::{
-    contours::Search,
+    around::Search,
     probes::Probe,
     surfaces::{Light, Met},
 };
@@ -40,6 +40,8 @@ pub(super) struct Crossed {
     pub flush: f64,
     /// The same where depth bends between them, as at a wall's foot: samples finer than a pixel find that, the middles of pixels do not.
     pub feet: f64,
+    /// The same where models stand on the terrain.
+    pub on_ground: f64,
     /// All three as a look once a pixel has them: what is narrower is not there.
     pub once_a_pixel: f64,
 }
@@ -47,6 +49,11 @@ pub(super) struct Crossed {
 /// From place to place a mesh has another colour, whatever is painted on it, if that changes by more than this, linear: its corners have no colours in common, or
 /// light falls on it from another side. Colours that change gradually do so by less over a third of a pixel.
 const OTHER_TINT: f64 = 0.02;
+
+/// Whether two places that see no step of depth between them are of the terrain and of what stands on it.
+fn is_on_ground(a: Option<&Met>, b: Option<&Met>) -> bool {
+    a.zip(b).is_some_and(|(a, b)| (a.surface == 0) != (b.surface == 0))
+}
 
 /// Whether two places that see no step of depth between them are of different meshes, or of parts of one that have different colours.
 fn is_another(a: Option<&Met>, b: Option<&Met>) -> bool {
@@ -68,7 +75,7 @@ impl Search<'_> {
         let [x, y] = probe.pixel;
         let mid_s = self.stamp_s + self.shutter.dt_pixel_s(x, y);
         let pose = self.path.pose(mid_s);
-        let (mut borders, mut contrast2, mut flush2, mut feet2, mut once_a_pixel2) = (0, 0.0, 0.0, 0.0, 0.0);
+        let (mut borders, mut contrast2, mut flush2, mut feet2, mut on_ground2, mut once_a_pixel2) = (0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for axis in if number.is_multiple_of(2) { UPRIGHT } else { DIAGONAL } {
             let uv = |place: f64| probe.uv + probe.uv_from_px * (APART_PX * (place - 0.5 * (PLACES - 1) as f64) * axis);
             let meet = |place: f64| self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * uv(place).extend(1.0));
@@ -99,6 +106,8 @@ impl Search<'_> {
                 } else if self.surfaces.blends() && light(k).panes != light(k + 1).panes {
                     // The border of what is mixed and has no depth of its own.
                     flush2 += square();
+                } else if is_on_ground(met[k].as_ref(), met[k + 1].as_ref()) {
+                    on_ground2 += square();
                 }
                 of_pixel += contrast2 + flush2 + feet2 - before;
                 if (k + 1) % A_PIXEL == 0 {
@@ -107,11 +116,18 @@ impl Search<'_> {
                 }
             }
         }
-        if borders == 0 && flush2 + feet2 == 0.0 {
+        if borders == 0 && flush2 + feet2 + on_ground2 == 0.0 {
             return Crossed::default();
         }
         let looked_at_px = 2.0 * APART_PX * (PLACES - 1) as f64;
         let of = |contrast2: f64| FRAC_PI_2 * contrast2 / looked_at_px * (self.gain)(probe.pixel).powi(2);
-        Crossed { borders, steps: of(contrast2), flush: of(flush2), feet: of(feet2), once_a_pixel: of(once_a_pixel2) }
+        Crossed {
+            borders,
+            steps: of(contrast2),
+            flush: of(flush2),
+            feet: of(feet2),
+            on_ground: of(on_ground2),
+            once_a_pixel: of(once_a_pixel2),
+        }
     }
 }

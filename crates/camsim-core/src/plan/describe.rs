@@ -61,7 +61,7 @@ pub struct PlanSummary<'a> {
     pub ideal_scale: f64,
     /// Bounds behind the choices.
     pub motion: Motion,
-    /// Bound on the displacement of the drawn terrain, ideal pixels.
+    /// Bound on the displacement of the drawn terrain, pixels of the camera's focal length.
     pub terrain_error_px: f64,
     /// How far the pixels' sources will be off, by cause.
     pub predicted: &'a Predicted,
@@ -193,7 +193,7 @@ impl FramePlan {
             taps: self.taps,
             ideal_scale: self.ideal.scale(&self.camera),
             motion: self.motion,
-            terrain_error_px: self.terrain_error_px,
+            terrain_error_px: self.terrain_error_px / self.ideal.scale(&self.camera),
             predicted: &self.predicted,
             skipped: &self.skipped,
         }
@@ -203,7 +203,7 @@ impl FramePlan {
 impl Predicted {
     /// By cause, the largest first.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, displaced_dn, .. } = *self;
+        let Self { total_px, probes, silhouette_share, level_of_detail_px, blur_dn, resampling_dn, displaced_dn, ground, .. } = *self;
         writeln!(f, "predicted error of the source coordinates, ideal px (99th percentile, pixels at silhouettes apart)")?;
         if probes == 0 {
             return writeln!(f, "  nothing predicted: no pixel tried has a source in the ideal frame; the picture will be empty");
@@ -235,6 +235,7 @@ impl Predicted {
             let share = 100.0 * share;
             writeln!(f, "  holes: {share:.4} % of the picture is hidden from the ideal frames, in strips of {width_px:.2} px{beside}")?;
         }
+        let ground = ground.map_or_else(String::new, |ground| format!(", {:.2} by the terrain's level of detail", ground.error_dn()));
         let silhouettes = self.silhouettes.map_or_else(String::new, |silhouettes| format!(", {:.2} at silhouettes", silhouettes.error_dn));
         let layers = self.layers.map_or_else(String::new, |Layers { share, error_dn }| {
             format!(
@@ -244,7 +245,7 @@ impl Predicted {
         });
         writeln!(
             f,
-            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples, {displaced_dn:.2} by sources beside their place{silhouettes}{layers}: {}",
+            "predicted error of the picture, 1/255 of the linear range (RMS): {resampling_dn:.2} by resampling, {blur_dn:.2} by blur samples, {displaced_dn:.2} by sources beside their place{ground}{silhouettes}{layers}: {}",
             if self.levels_kept { "within the tolerance" } else { "the tolerance is NOT KEPT" }
         )?;
         match &self.levels_in_the_way {

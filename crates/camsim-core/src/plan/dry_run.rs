@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::{
     PathStage, TemporalStage,
-    contours::LINES,
+    around::LINES,
     exposure::miss_px,
     probes::Probe,
     surfaces::{Met, Surfaces},
@@ -273,6 +273,19 @@ impl Trial<'_> {
         let inverse = |depth_m: f64| direction.z / (depth_m - shift.z).max(1e-9);
         let moved = |w: f64| self.ideal.px_from_point(direction + w * shift);
         moved(inverse(drawn_m)).distance(moved(inverse(depth_m)))
+    }
+
+    /// How far the place of the terrain's picture that is drawn at the true source is from there, ideal pixels: to first order, and no more than is allowed.
+    pub fn ground_px(&self, truth: &Truth, detail: &TerrainDetail<'_>) -> f64 {
+        let Some(Met { depth_m, terrain: Some(hit), .. }) = truth.seen else { return 0.0 };
+        let ray_ned = self.key_ray(truth.at_px);
+        let drawn_m = self.drawn_depth_m(Some(detail), &hit, ray_ned);
+        // Down to the full surface.
+        let down_m = (depth_m - drawn_m) * ray_ned.dot(hit.normal_ned) / hit.normal_ned.z;
+        let in_key = self.key_pose.ned_from_camera.inverse() * (drawn_m * ray_ned + down_m * DVec3::Z);
+        let px = self.ideal.px_from_point(in_key).distance(truth.at_px);
+        // A normal along the horizon tells nothing.
+        if px < detail.max_error_px() { px } else { detail.max_error_px() }
     }
 
     /// Depth of the terrain as drawn, along a ray of the key camera that meets the full one at `hit`.

@@ -6,6 +6,7 @@
 //! that are solved in the same way answer for the largest error of any (88.8 % of two, 98.7 % of four). What it misses is what [`SAFETY`] is for.
 
 mod forecast;
+mod ground;
 mod map;
 
 use std::sync::OnceLock;
@@ -15,9 +16,9 @@ use rayon::prelude::*;
 
 use super::{
     BlurStage, Contours, Holes, KeyFrame, Layers, LensReach, Motion, NodeDepths, Predicted, RayStage, SeenPlane, TemporalStage,
+    contours::Outlook,
     displaced::ShownWaves,
     dry_run::{MAX_LOOK_UPS, Trial, Truth},
-    holes,
     levels::Expected,
     probes::Probe,
     surfaces::Surfaces,
@@ -35,14 +36,13 @@ use crate::{
     },
 };
 
+pub use ground::Ground;
 pub use map::{ErrorMap, ErrorPlace, PlaceError};
 
 /// Times the largest error found.
 const SAFETY: f64 = 1.25;
 /// Share of the pixels that may look outside of the ideal frame: more, and the 99th percentile is of no source at all.
 pub(crate) const MOST_VOID_SHARE: f64 = 0.01;
-/// Part of the tolerance that the level of detail may take.
-const DETAIL_SHARE: f64 = 0.3;
 /// Part of the tolerance that a bound on what is left out may take.
 const BOUND_SHARE: f64 = 0.5;
 /// Part of an error from which on more nodes of the exposure's path are worth a try.
@@ -77,7 +77,8 @@ pub(super) struct Case<'a> {
     /// What pixels show, and what sources beside their place may cost of it, 1/255 of the linear range.
     pub shown: &'a ShownWaves,
     pub most_displaced_dn: f64,
-    /// Cost of silhouettes.
+    /// Around the probes, and cost of silhouettes.
+    pub outlook: Option<&'a Outlook>,
     pub silhouettes: Option<Contours>,
     /// Cost of what is mixed.
     pub layers: Option<Layers>,
@@ -143,15 +144,8 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
     let quality = &case.sequence.scenario.quality;
     let tolerance_px = quality.max_error_px;
     let truths = case.truths();
-    let mut terrain_error_px = quality.max_terrain_error_px;
-    let mut detail = case.terrain_detail(terrain_error_px);
-    let detail_px = truths.level_of_detail_px(detail.as_ref());
-    if SAFETY * detail_px > DETAIL_SHARE * tolerance_px {
-        // The error falls in proportion.
-        terrain_error_px *= 0.8 * DETAIL_SHARE * tolerance_px / (SAFETY * detail_px);
-        detail = case.terrain_detail(terrain_error_px);
-    }
-    let forecast = truths.forecast(detail.as_ref());
+    let ground::Coarsened { error_px: terrain_error_px, detail, ground } = ground::coarsest(case, &truths);
+    let forecast = truths.forecast(detail.as_ref(), ground);
     // Something small and near may pass between the probes: where there are silhouettes only the bound counts.
     let may_skip_depth = !case.silhouettes_in_view || motion.parallax_px <= BOUND_SHARE * tolerance_px;
     let way = match case.demanded {
@@ -170,8 +164,9 @@ pub(super) fn choose<'a>(case: &Case<'a>, motion: &Motion) -> Choice<'a> {
 fn missed_px(case: &Case<'_>, predicted: &Predicted) -> Option<[f64; 2]> {
     let (max_error_px, nodes_px) = (case.sequence.scenario.quality.max_error_px, predicted.nodes_px);
     // Grey levels follow the displacement.
-    let is_seen = predicted.displaced_dn > case.most_displaced_dn && nodes_px > OF_NODES * predicted.total_px;
-    let for_levels_px = is_seen.then(|| nodes_px * case.most_displaced_dn / predicted.displaced_dn);
+    let most_dn = case.left_by(predicted.ground);
+    let is_seen = predicted.displaced_dn > most_dn && nodes_px > OF_NODES * predicted.total_px;
+    let for_levels_px = is_seen.then(|| nodes_px * most_dn / predicted.displaced_dn);
     let for_sources_px = (!predicted.kept).then_some(max_error_px);
     for_levels_px.into_iter().chain(for_sources_px).reduce(f64::min).map(|most_px| [nodes_px, most_px])
 }
@@ -217,6 +212,13 @@ impl<'a> Case<'a> {
     /// Whether anybody wants to know what these solvers do.
     fn asks_for_twist(&self) -> bool {
         matches!(self.demanded, Some(TemporalStage::Linear | TemporalStage::Rk2)) || self.demanded.is_none() && self.may_take_twist()
+    }
+
+    /// What the ground leaves for sources beside their place, 1/255.
+    fn left_by(&self, ground: Option<Ground>) -> f64 {
+        let most_dn = self.most_displaced_dn;
+        let ground_dn = ground.map_or(0.0, |ground| ground.error_dn()).min(ground::SHARE_OF_DN * most_dn);
+        (most_dn * most_dn - ground_dn * ground_dn).sqrt()
     }
 
     fn terrain_detail(&self, max_error_px: f64) -> Option<TerrainDetail<'a>> {
@@ -349,12 +351,6 @@ impl<'a> Truths<'a> {
     /// Side of the part of the picture that a probe stands for, ideal pixels.
     fn probe_px(&self) -> f64 {
         self.trial.ideal.scale(&self.reach.camera) * self.reach.probe_px
-    }
-
-    /// Mean squared error over the picture by skylines that are elsewhere in an ideal frame, of the linear range; `gain` is that of a pixel.
-    pub fn sky_strips(&self, key: &KeyFrame, gain: &(dyn Fn([u32; 2]) -> f64 + Sync)) -> f64 {
-        let looked: Vec<_> = self.looked.iter().map(|looked| (&looked.probe, &looked.truth)).collect();
-        holes::sky_strips(&self.trial, &looked, key, self.probe_px(), gain)
     }
 
     /// Miss of what lies between the depths of the exposure's ends, and between these and its middle, of each probe, and the largest. `elsewhere` is

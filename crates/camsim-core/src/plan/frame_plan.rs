@@ -102,8 +102,8 @@ pub struct FramePlan {
     pub truth: bool,
     /// What the choices rest on.
     pub motion: Motion,
-    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px`, or less where the parallax within the
-    /// frame would turn the difference into an error of the coordinates.
+    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px` of the camera's, or of the ideal frame's where those are larger; or less where that would leave more of an
+    /// error in the picture than `quality.max_error_dn` has left, or the parallax within the frame would turn it into one of the coordinates.
     pub terrain_error_px: f64,
     /// How far the pixels' sources will be off.
     pub predicted: Predicted,
@@ -152,7 +152,7 @@ impl FramePlan {
         LevelTolerance {
             focal_px: self.ideal.focal_px.max_element(),
             tangents: self.tangents(),
-            error_px: MODEL_SHARE * self.terrain_error_px * self.ideal.scale(&self.camera).max(1.0),
+            error_px: MODEL_SHARE * quality.max_terrain_error_px * self.ideal.scale(&self.camera).max(1.0),
             travel_m: self.motion.travel_m,
             parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
         }

@@ -17,6 +17,7 @@ use super::{
 };
 use crate::{
     scenario::{Auto, Preset, QualitySpec},
+    scene::Scene,
     temporal::{Footprint, SAMPLES, TENT_PX2, TapStage, samples_for},
 };
 
@@ -39,9 +40,10 @@ pub(super) const MOST_SCALE: f64 = 2.0;
 pub(super) const FINEST_SCALE: f64 = MOST_TAPS as f64;
 /// Samples a pixel of path that are tried.
 const SAMPLES_PER_PX: [f64; 14] = [0.25, 0.33, 0.4, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0];
-/// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may take 0.995 of it; and of an error that is above it anyway the part
-/// that these may be.
+/// Part of `quality.max_error_dn` that is always left for sources beside their place, so that all else may take 0.995 of it; with a terrain for its level of detail too, so that all else may take
+/// 0.954; and of an error that is above it anyway the part that these may be.
 const LEFT_FOR_DISPLACED: f64 = 0.1;
+const LEFT_WITH_GROUND: f64 = 0.3;
 const OF_BROKEN: f64 = 0.3;
 /// What is left of a tolerance and what is taken of it may add up to a little more.
 const ROUNDED: f64 = 1.0 + 1e-9;
@@ -86,8 +88,9 @@ pub(super) struct Sampling {
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub quality: &'a QualitySpec,
-    /// 1/255 of the linear range, over the picture.
+    /// 1/255 of the linear range, over the picture; and what a way may leave that another frame has chosen.
     pub max_error_dn: f64,
+    pub most_error_dn: f64,
     /// Scales of the ideal frame: not below the one, and below the other.
     pub least_scale: f64,
     pub most_scale: f64,
@@ -298,7 +301,7 @@ impl Prospect<'_> {
         let expected = self.expected(sampling, blur);
         let total_dn = expected.total_dn().hypot(beside_dn(sampling, blur).unwrap_or(f64::INFINITY));
         let price = self.price(sampling, blur, task.ideal_share);
-        let within = total_dn <= for_sampling_dn(task.quality);
+        let within = total_dn <= task.most_error_dn;
         Choice { sampling: Sampling { expected, ..*sampling }, price, total_dn, within, least_dn: total_dn }
     }
 
@@ -374,13 +377,14 @@ fn dn(square: f64) -> f64 {
 }
 
 /// What sampling, silhouettes and mixed light may take of `quality.max_error_dn`: the rest is kept for sources beside their place.
-pub(super) fn for_sampling_dn(quality: &QualitySpec) -> f64 {
-    (1.0 - LEFT_FOR_DISPLACED * LEFT_FOR_DISPLACED).sqrt() * quality.max_error_dn
+pub(super) fn for_sampling_dn(quality: &QualitySpec, scene: &Scene) -> f64 {
+    let left = if scene.terrain.is_some() { LEFT_WITH_GROUND } else { LEFT_FOR_DISPLACED };
+    (1.0 - left * left).sqrt() * quality.max_error_dn
 }
 
-/// What sources beside their place may cost beside all others, 1/255: what these leave of the tolerance.
-pub(super) fn for_displaced_dn(quality: &QualitySpec, others_dn: f64) -> f64 {
-    if others_dn > for_sampling_dn(quality) {
+/// What the ground's level of detail and sources beside their place may cost beside all others, 1/255: what these leave of the tolerance.
+pub(super) fn for_displaced_dn(quality: &QualitySpec, scene: &Scene, others_dn: f64) -> f64 {
+    if others_dn > for_sampling_dn(quality, scene) {
         return OF_BROKEN * others_dn;
     }
     (quality.max_error_dn.powi(2) - others_dn.powi(2)).max(0.0).sqrt()
@@ -395,10 +399,14 @@ pub(super) fn in_the_way(quality: &QualitySpec, sampling: &Sampling, predicted: 
     if quality.preset == Preset::Paper {
         return Some(format!("quality.preset \"paper\": {total_dn:.2}/255 and what is not in it"));
     }
-    let Predicted { resampling_dn, blur_dn, displaced_dn, silhouettes, layers, .. } = *predicted;
+    let Predicted { resampling_dn, blur_dn, displaced_dn, ground, silhouettes, layers, .. } = *predicted;
     let sampled_dn = resampling_dn.hypot(blur_dn);
     let at_silhouettes_dn = silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
     let by_layers_dn = layers.map_or(0.0, |layers| layers.error_dn);
+    let by_ground_dn = ground.map_or(0.0, |ground| ground.error_dn());
+    if by_ground_dn > displaced_dn.max(sampled_dn).max(at_silhouettes_dn).max(by_layers_dn) {
+        return Some(format!("the terrain's level of detail (quality.max_terrain_error_px): {by_ground_dn:.2}/255"));
+    }
     if displaced_dn > sampled_dn.max(at_silhouettes_dn).max(by_layers_dn) {
         let by = if quality.solver == Auto::Auto { "" } else { " (quality.solver is given)" };
         return Some(format!("sources beside their place{by}: {displaced_dn:.2}/255"));

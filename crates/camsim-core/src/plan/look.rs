@@ -3,9 +3,13 @@
 use std::sync::Arc;
 
 use super::{
-    BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage, bounds, contours,
-    displaced::ShownWaves, dry_run, edges, error, exposure, forced, layers, levels::Sampling, motion, paper, probes::Probe, prospect,
-    sharing, zoom_at,
+    BlurStage, EdgeStage, IdealGeometry, KeyFrame, LensReach, Motion, PlanError, Planner, TemporalStage,
+    around::{Search, Surroundings},
+    bounds, contours,
+    displaced::ShownWaves,
+    dry_run, edges, error, exposure, forced, layers,
+    levels::Sampling,
+    motion, paper, prospect, sharing, zoom_at,
 };
 use crate::{
     mount::CameraPath,
@@ -200,35 +204,30 @@ impl<'a> Look<'a> {
             plane: glam::DVec3::ZERO,
         };
         let truths = error::Truths::of_silhouettes(reach, trial);
-        let gain = &prospect::gain(sequence, &reach.camera);
-        let around = self.around(self.frame, reach);
-        let least_share = truths.share_apart(|probe| around[probe].is_beside);
-        let (holes, sky_strips) = (truths.holes(&[self.key()], quality.max_error_px), truths.sky_strips(&self.key(), gain));
-        let outlook = |around: &[contours::Around]| contours::Outlook::new(around, &reach.camera, key_pose, holes, sky_strips, least_share);
-        let others = if self.has_half { self.around_other_half() } else { None };
-        Some(match others {
-            Some(others) => outlook(&[&around[..], &others].concat()),
-            None => outlook(&around),
-        })
+        let own = self.surroundings(self.frame, reach);
+        let least_share = truths.share_apart(|probe| own.around[probe].is_beside);
+        let (plane, holes) = (truths.plane(), truths.holes(&[self.key()], quality.max_error_px));
+        let outlook = |all: &Surroundings| contours::Outlook::new(all, &reach.camera, key_pose, &plane, holes, least_share);
+        let others = if self.has_half { self.surroundings_of_other_half() } else { None };
+        Some(others.map_or_else(|| outlook(&own), |others| outlook(&own.and(others))))
     }
 
     /// What the probes of a frame see around them.
-    fn around(&self, frame: u64, reach: &LensReach) -> Arc<Vec<contours::Around>> {
-        let Planner { sequence, shutter, surfaces, around, around_by_half, .. } = self.planner;
+    fn surroundings(&self, frame: u64, reach: &LensReach) -> Arc<Surroundings> {
+        let Planner { sequence, shutter, surfaces, surroundings, surroundings_by_half, .. } = self.planner;
         let gain = &prospect::gain(sequence, &reach.camera);
-        let search = contours::Search { reach, surfaces, path: self.path(), shutter, stamp_s: self.planner.stamp_s(frame), gain };
-        let known = if self.has_half { around_by_half } else { around };
+        let search = Search { reach, surfaces, path: self.path(), shutter, stamp_s: self.planner.stamp_s(frame), gain };
+        let known = if self.has_half { surroundings_by_half } else { surroundings };
         known.of(frame, || search.look_around())
     }
 
     /// What is around the probes that this frame of a group leaves to the one beside it, as its own camera would see that: borders are few, and half of them tell
     /// too little.
-    fn around_other_half(&self) -> Option<Vec<contours::Around>> {
+    fn surroundings_of_other_half(&self) -> Option<Surroundings> {
         let other = self.frame ^ 1;
         let reach = self.planner.half_the_probes(other).filter(|_| other < self.planner.sequence.frames)?;
-        let own_pose = |probe: &Probe| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(probe.pixel[0], probe.pixel[1]));
-        let found = self.around(other, &reach);
-        Some(found.iter().zip(&reach.probes).map(|(around, probe)| around.seen_from(own_pose(probe))).collect())
+        let own_pose = |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(x, y));
+        Some(self.surroundings(other, &reach).seen_from(&reach.probes, own_pose))
     }
 }
 

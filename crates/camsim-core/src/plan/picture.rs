@@ -68,10 +68,12 @@ impl Look<'_> {
             };
         }
         let quality = &self.planner.sequence.scenario.quality;
-        let max_error_dn = for_sampling_dn(quality) * self.asked.share_of_dn;
+        let most_error_dn = for_sampling_dn(quality, &self.planner.sequence.scene);
+        let max_error_dn = most_error_dn * self.asked.share_of_dn;
         let task = Task {
             quality,
             max_error_dn,
+            most_error_dn,
             least_scale: self.reach.least_scale(),
             most_scale: self.scale_of(scenery, self.planner.max_ideal_px, self.planner.max_side_px),
             ideal_share: self.ideal_share(scenery),

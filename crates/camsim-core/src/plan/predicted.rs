@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Contours, Holes, Layers};
+use super::{Contours, Ground, Holes, Layers};
 
 /// Predicted errors of a frame. All `_px` are pixels of the ideal frame and bound the 99th percentile over the valid pixels that are
 /// farther than 3 px from any silhouette.
@@ -26,6 +26,8 @@ pub struct Predicted {
     pub blur_dn: f64,
     /// The same of sources beside their place.
     pub displaced_dn: f64,
+    /// What it costs that the terrain is drawn coarser than it is; `None` without one.
+    pub ground: Option<Ground>,
     /// What silhouettes cost, as they are made: left as the ideal frame's pixels show them, or with rays of their own. `None` where none can be in view, or
     /// nobody asks.
     pub silhouettes: Option<Contours>,
@@ -63,6 +65,7 @@ impl Predicted {
     /// The same without what mixed light costs by having one depth.
     pub(super) fn without_layers_dn(&self) -> f64 {
         let at_silhouettes_dn = self.silhouettes.map_or(0.0, |silhouettes| silhouettes.error_dn);
-        self.resampling_dn.hypot(self.blur_dn).hypot(self.displaced_dn).hypot(at_silhouettes_dn)
+        let by_ground_dn = self.ground.map_or(0.0, |ground| ground.error_dn());
+        self.resampling_dn.hypot(self.blur_dn).hypot(self.displaced_dn).hypot(by_ground_dn).hypot(at_silhouettes_dn)
     }
 }

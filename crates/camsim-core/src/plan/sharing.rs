@@ -106,8 +106,12 @@ impl<'a> Candidates<'a> {
             Ok((frame, look.asking(asked).picture(scenery).total_dn))
         };
         let all: Vec<(u64, f64)> = self.common.frames.clone().into_par_iter().map(picture_dn).collect::<Result<_, _>>()?;
-        let most_dn =
-            if own.predicted.levels_kept { for_sampling_dn(&self.planner.sequence.scenario.quality) } else { own.predicted.picture_dn() };
+        let sequence = &self.planner.sequence;
+        let most_dn = if own.predicted.levels_kept {
+            for_sampling_dn(&sequence.scenario.quality, &sequence.scene)
+        } else {
+            own.predicted.picture_dn()
+        };
         let worst = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
         Ok(worst.filter(|(_, dn)| *dn > most_dn).map(|(frame, _)| frame))
     }
@@ -151,8 +155,8 @@ impl Planner {
 
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.
     pub fn forget(&self) {
-        self.around.forget();
-        self.around_by_half.forget();
+        self.surroundings.forget();
+        self.surroundings_by_half.forget();
         self.groups.forget();
         self.last.forget();
     }
@@ -321,6 +325,7 @@ fn together(mut plans: Vec<FramePlan>) -> Vec<FramePlan> {
     for (plan, sources) in plans.iter_mut().zip(sources) {
         sources.write(&mut plan.predicted);
         plan.shared_by = Some([first, last]);
+        plan.predicted.ground = plan.predicted.ground.map(|ground| ground.times(terrain_error_px / plan.terrain_error_px));
         plan.terrain_error_px = terrain_error_px;
         plan.motion = motion;
         plan.skipped.push(Skip { what: "ideal frame of its own", reason: format!("frames {first} to {last} are made from one") });

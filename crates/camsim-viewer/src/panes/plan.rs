@@ -93,7 +93,12 @@ fn sources(ui: &mut Ui, picture: &Picture, has_terrain: bool) {
         fact(ui, what, format!("{px:.5} px"), tip);
     }
     if has_terrain {
-        fact(ui, "terrain", format!("{:.3} px", plan.terrain_error_px), "bound on what its level of detail moves; counted apart");
+        fact(
+            ui,
+            "terrain",
+            format!("{:.3} px", plan.terrain_error_px / plan.ideal.scale(&plan.camera)),
+            "bound on what its level of detail moves in the picture",
+        );
     }
     if predicted.silhouette_share > 0.0 {
         let share = format!("at least {:.1} %", 100.0 * predicted.silhouette_share);
@@ -111,6 +116,9 @@ fn levels(ui: &mut Ui, predicted: &Predicted) {
     fact(ui, "resampling", format!("{:.3}", predicted.resampling_dn), "of the ideal frame, away from silhouettes");
     fact(ui, "blur samples", format!("{:.3}", predicted.blur_dn), "too few of them over the exposure");
     fact(ui, "beside their place", format!("{:.3}", predicted.displaced_dn), "sources of pixels, away from silhouettes");
+    if let Some(ground) = predicted.ground {
+        fact(ui, "terrain", format!("{:.3}", ground.error_dn()), "drawn coarser than it is, its borders too");
+    }
     if let Some(silhouettes) = predicted.silhouettes {
         fact(ui, "silhouettes", format!("{:.3}", silhouettes.error_dn), "as they are made: by the ideal frame's pixels or by rays");
     }

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use super::{Case, Looked, MOST_VOID_SHARE, SAFETY, Truths, Way};
+use super::{Case, Ground, Looked, MOST_VOID_SHARE, SAFETY, Truths, Way};
 use crate::{
     plan::{
         BlurStage, NodeDepths, Predicted, TemporalStage,
@@ -34,12 +34,13 @@ const MISS_PROBES: usize = 32;
 const MISSED_STRETCHES: u32 = 8;
 
 impl<'a> Truths<'a> {
-    pub(super) fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>) -> Forecast<'a> {
+    pub(super) fn forecast(&'a self, detail: Option<&'a TerrainDetail<'a>>, ground: Option<Ground>) -> Forecast<'a> {
         let run = |looked: &Looked| self.trial.run(&looked.probe, &looked.truth, detail);
         let outcomes = self.looked.par_iter().with_min_len(16).map(run).collect();
         Forecast {
             outcomes,
             detail,
+            ground,
             truths: self,
             between_px: OnceLock::new(),
             of_mid: OnceLock::new(),
@@ -52,6 +53,8 @@ impl<'a> Truths<'a> {
 pub(super) struct Forecast<'a> {
     truths: &'a Truths<'a>,
     detail: Option<&'a TerrainDetail<'a>>,
+    /// What that costs.
+    ground: Option<Ground>,
     /// One for each of the probes.
     pub(super) outcomes: Vec<Outcome>,
     /// [`Forecast::between_px`] of both, of each probe and the largest, once it matters.
@@ -186,7 +189,7 @@ impl Forecast<'_> {
             if of_px > 1.0 && !is_better(of_px) {
                 continue;
             }
-            let of_tolerance = of_px.max(self.displaced_dn(case, way, missed) / case.most_displaced_dn);
+            let of_tolerance = of_px.max(self.displaced_dn(case, way, missed) / case.left_by(self.ground));
             if of_tolerance <= 1.0 {
                 return Ok(way);
             }
@@ -241,6 +244,7 @@ impl Forecast<'_> {
             resampling_dn,
             blur_dn,
             displaced_dn: self.displaced_dn(case, way, missed),
+            ground: self.ground,
             silhouettes: case.silhouettes,
             layers: case.layers,
             // Judged when all that comes to it is known.

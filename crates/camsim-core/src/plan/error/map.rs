@@ -99,7 +99,7 @@ impl Planner {
         };
         let truths = Truths::new(&reach, plan.ray, trial, super::phases(&self.sequence.path, plan.blur.is_some()), 1);
         let detail = super::terrain_detail(&self.sequence, &key_pose, &ideal, plan.terrain_error_px);
-        let forecast = truths.forecast(detail.as_ref());
+        let forecast = truths.forecast(detail.as_ref(), None);
         let everywhere_px = SAFETY * forecast.between_px(way) + forecast.missed(way.blur).largest_px;
         // What all places ask for is worked out in parallel itself: a thread that waits for its parts would take up a place that waits for it.
         forecast.prepare(way);
