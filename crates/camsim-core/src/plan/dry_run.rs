@@ -23,6 +23,8 @@ use crate::{
 pub(super) const MAX_LOOK_UPS: usize = 8;
 /// Relative difference of depth beyond which something else stands before a point.
 const HIDDEN: f64 = 1e-3;
+/// Relative difference of inverse depth up to which the ends of an exposure are taken to see one surface.
+const ONE_SURFACE: f64 = 0.02;
 
 /// A frame to be tried.
 #[derive(Clone, Copy)]
@@ -147,19 +149,23 @@ impl Trial<'_> {
         outcome
     }
 
-    /// How far from the truth a probe looks with the depth that n look-ups find at mid-exposure; `None` if it is that.
-    pub fn of_mid(&self, probe: &Probe, truth: &Truth, detail: Option<&TerrainDetail<'_>>) -> Option<[f64; MAX_LOOK_UPS + 1]> {
-        let mid_s = self.instant_s(probe, 0.5);
-        if truth.t_s == mid_s {
-            return None;
-        }
+    /// How far from the truth a probe looks with the depth that n look-ups find at mid-exposure: at its own instant, or at the end of its exposure that is farther from that, where `elsewhere` is
+    /// [`Outcome::elsewhere`].
+    pub fn of_mid(&self, probe: &Probe, truth: &Truth, elsewhere: f64, detail: Option<&TerrainDetail<'_>>) -> [f64; MAX_LOOK_UPS + 1] {
         let mut depth = KeyDepth { trial: self, detail, known: Vec::with_capacity(8), drawn: None };
-        let looked_at = self.settle(probe.uv, self.path.pose(mid_s).relative_to(self.key_pose), None, &mut depth);
-        let (direction, shift) = (truth.direction, truth.in_key.1);
-        Some(std::array::from_fn(|n| {
-            let w = n.checked_sub(1).and_then(|last| depth_on_line(direction, shift, depth.inverse_depth(looked_at[last])));
-            self.off_px(truth, direction + w.unwrap_or(0.0) * shift)
-        }))
+        let looked_at = self.settle(probe.uv, self.path.pose(self.instant_s(probe, 0.5)).relative_to(self.key_pose), None, &mut depth);
+        let (rotation, end_shift) = self.path.pose(self.instant_s(probe, truth.far_end())).relative_to(self.key_pose);
+        let (end_direction, (direction, shift)) = (rotation * probe.uv.extend(1.0), (truth.direction, truth.in_key.1));
+        let at_end_px = |w: f64| self.ideal.px_from_point(end_direction + w * end_shift);
+        // Where something else is met there a silhouette has passed.
+        let is_one_surface = (elsewhere / truth.key_inverse_depth - 1.0).abs() < ONE_SURFACE;
+        let true_end_px = depth_on_line(end_direction, end_shift, elsewhere).filter(|_| is_one_surface).map(at_end_px);
+        std::array::from_fn(|n| {
+            let found = n.checked_sub(1).map(|last| depth.inverse_depth(looked_at[last]));
+            let on_line = |direction, shift| found.and_then(|found| depth_on_line(direction, shift, found)).unwrap_or(0.0);
+            let at_end = true_end_px.map_or(0.0, |end_px| at_end_px(on_line(end_direction, end_shift)).distance(end_px));
+            self.off_px(truth, direction + on_line(direction, shift) * shift).max(at_end)
+        })
     }
 
     /// How far from the truth a place is, given in the key camera.

@@ -119,7 +119,7 @@ impl Forecast<'_> {
     /// Of one probe in `step`.
     fn of_mid_of(&self, step: usize) -> Vec<OfMid> {
         let Truths { trial, looked, .. } = self.truths;
-        let of = |(looked, run): (&Looked, &Outcome)| trial.of_mid(&looked.probe, &looked.truth, self.detail).unwrap_or(run.after);
+        let of = |(looked, run): (&Looked, &Outcome)| trial.of_mid(&looked.probe, &looked.truth, run.elsewhere, self.detail);
         looked.par_iter().zip(&self.outcomes).step_by(step).with_min_len(16).map(of).collect()
     }
 
