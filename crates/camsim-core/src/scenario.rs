@@ -187,9 +187,9 @@ pub struct QualitySpec {
     pub preset: Preset,
     /// Bound on the 99th percentile of the source coordinate's error over valid pixels.
     pub max_error_px: f64,
-    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place and at silhouettes.
+    /// RMS bound in 1/255 of linear range, from resampling, blur sampling, sources beside their place, the terrain's level of detail and at silhouettes.
     pub max_error_dn: f64,
-    /// Bound on the terrain level of detail, reported apart.
+    /// Bound on what the terrain's level of detail moves, pixels of the picture; what that costs counts in `max_error_dn`.
     pub max_terrain_error_px: f64,
     /// Temporal solver.
     pub solver: Auto<Solver>,

@@ -34,7 +34,7 @@ const DEFAULT_FRAMES: u64 = 5;
 /// a hundredth is missing or falsely valid, or none can be compared, there is none, and the tolerance is broken.
 ///
 /// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
-/// errors hold only what it does to parallax. What it does to the picture is measured by --pictures.
+/// errors of sources hold only what it does to parallax. What it does to the picture is in the predicted error of that and measured by --pictures.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

@@ -9,7 +9,6 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
-
 use rayon::prelude::*;
 
 use super::{SeenPlane, around::Search, probes::Probe, prospect::path_px};

@@ -168,7 +168,8 @@ impl TerrainSlot {
     }
 }
 
-const FEWER_TRIANGLES: &str = "allow larger quality.max_terrain_error_px, or use a coarser DEM in scene.terrain.dem";
+const FEWER_TRIANGLES: &str =
+    "allow larger quality.max_terrain_error_px and quality.max_error_dn, or use a coarser DEM in scene.terrain.dem";
 
 /// Writes the vertices and triangles of a key; returns the number of indices.
 pub(super) fn place_terrain(
