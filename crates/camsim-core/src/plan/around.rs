@@ -159,7 +159,8 @@ impl Search<'_> {
         let is_ground = |pair: &&[usize; 2]| {
             let [a, b] = **pair;
             let nearer = if inverse_depth[a] > inverse_depth[b] { a } else { b };
-            met[nearer].is_some_and(|met| met.terrain.is_some())
+            // What is before the sky is the skyline's.
+            met[nearer].is_some_and(|met| met.terrain.is_some()) && inverse_depth[a].min(inverse_depth[b]) > 0.0
         };
         let gain2 = (self.gain)(probe.pixel).powi(2);
         let ground2 = gain2 * across.iter().filter(is_ground).map(contrast2).sum::<f64>() / across.len().max(1) as f64;

@@ -18,9 +18,10 @@ use super::{
     around::{Around, Contour, Surroundings},
     borders::Crossed,
     levels::Sampling,
+    skyline::Skyline,
     stairs::Places,
 };
-use crate::{camera::CameraModel, pose::CameraPose};
+use crate::{camera::CameraModel, pose::CameraPose, scene::TerrainDetail};
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
 const SAFETY: f64 = 1.3;
@@ -31,7 +32,7 @@ const MOST_FINER: f64 = 2.0;
 /// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
 const STRIPS: f64 = 2.0;
 /// How far the ground's borders are displaced, in times of all of it: they are ridges, which coarser triangles cut off. Over an alpine valley the whole error by a level of detail of 0.25 px was 0.34 to
-/// 0.51/255 in ten frames, with 3500 houses or none, and with this factor 0.8 to 1.1 times that is foretold.
+/// 0.51/255 in ten frames, with 3500 houses or none; what is foretold with this factor was 0.8 to 1.1 times that, and more since the skyline is known by itself.
 const RIDGES: f64 = 1.5;
 /// Part of `quality.max_error_dn` that silhouettes may take, and how many times that tolerance the pixels at them may be off, RMS.
 const SHARE: f64 = 0.9;
@@ -75,6 +76,7 @@ pub(super) struct Outlook {
     once_a_pixel: f64,
     /// [`Around::of_ground`], mean over the pixels of the picture.
     of_ground: f64,
+    skyline: Skyline,
     places: Places,
 }
 
@@ -113,14 +115,16 @@ impl Outlook {
             feet: unsure * finer * over_all(&|crossed| crossed.feet),
             once_a_pixel: (unsure * finer * finer).recip(),
             of_ground: SAFETY * SAFETY * around.iter().map(|around| around.of_ground).sum::<f64>() / around.len().max(1) as f64,
+            skyline: skyline.clone(),
             places: Places::new(around.iter().filter_map(Around::place)),
         }
     }
 
     /// RMS error over the picture by borders of a ground that is displaced by so much, RMS, pixels of the camera's focal length; 1/255 of the linear range. A border passes over as much of
-    /// a pixel as it is displaced, as often across it as along it.
-    pub fn ground_dn(&self, displaced_px: f64) -> f64 {
-        255.0 * RIDGES * displaced_px * (0.5 * self.of_ground).sqrt()
+    /// a pixel as it is displaced, as often across it as along it; before the sky it is known by how much.
+    pub fn ground_dn(&self, displaced_px: f64, detail: &TerrainDetail<'_>) -> f64 {
+        let before_ground = (RIDGES * displaced_px).powi(2) * 0.5 * self.of_ground;
+        255.0 * (before_ground + self.skyline.lowered(detail)).sqrt()
     }
 
     /// Left as they are.
@@ -191,15 +195,20 @@ pub(super) mod tests {
 
     /// Level, 150 m above the origin at 0 s, looking down.
     pub(in crate::plan) fn flying_east() -> CameraPath {
+        flying_east_from(DVec3::new(0.0, 0.0, -150.0), -90.0)
+    }
+
+    /// The same from somewhere at 0 s, looking up by so many degrees to the north.
+    pub(in crate::plan) fn flying_east_from(from_ned_m: DVec3, up_deg: f64) -> CameraPath {
         let state = |t_s: f64| BodyState {
-            position_ned_m: DVec3::new(0.0, SPEED_M_S * t_s, -150.0),
+            position_ned_m: from_ned_m + SPEED_M_S * t_s * DVec3::Y,
             velocity_ned_m_s: DVec3::new(0.0, SPEED_M_S, 0.0),
             acceleration_ned_m_s2: DVec3::ZERO,
             ned_from_body: DQuat::IDENTITY,
             rate_body_rad_s: DVec3::ZERO,
             angular_acceleration_body_rad_s2: DVec3::ZERO,
         };
-        let mount = MountSpec { angles_deg: [0.0, -90.0, 0.0], ..MountSpec::default() };
+        let mount = MountSpec { angles_deg: [0.0, up_deg, 0.0], ..MountSpec::default() };
         let knots = (0..=20).map(|k| state(0.1 * f64::from(k) - 1.0)).collect();
         CameraPath::new(Trajectory::uniform(-1.0, 0.1, 1.0, knots).unwrap(), &mount).unwrap()
     }
@@ -319,6 +328,7 @@ pub(super) mod tests {
             feet: 1e-3,
             once_a_pixel: 1.0,
             of_ground: 0.0,
+            skyline: Skyline::default(),
             places,
         };
         let with_rays = |fine: u32| feet.with_rays(&read_at(2.0), None, fine, u32::MAX).error_dn;

@@ -102,7 +102,7 @@ pub struct FramePlan {
     pub truth: bool,
     /// What the choices rest on.
     pub motion: Motion,
-    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px` of the camera's, or of the ideal frame's where those are larger; or less where that would leave more of an
+    /// Bound on the displacement of the drawn terrain, ideal pixels: `quality.max_terrain_error_px` of the camera's, or less where that would leave more of an
     /// error in the picture than `quality.max_error_dn` has left, or the parallax within the frame would turn it into one of the coordinates.
     pub terrain_error_px: f64,
     /// How far the pixels' sources will be off.

@@ -8,14 +8,20 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{SeenPlane, around::Search, probes::Probe, prospect::path_px};
-use crate::{pose::CameraPose, silhouette::NEAR_PX};
+use crate::{
+    pose::CameraPose,
+    scene::{TerrainDetail, TerrainHit},
+    silhouette::NEAR_PX,
+};
 
 /// Times what is expected: of some places, between which a skyline is more rugged. With it 0.63 to 1.01 of what is foretold was found with groups of eight frames over an alpine valley.
 const SAFETY: f64 = 1.5;
+/// The same of a ground that is drawn coarser than it is.
+const SAFETY_OF_GROUND: f64 = 1.2;
 /// Neighbours are nearer than so many sides of a probe's part of the picture.
 const NEIGHBOURS: f64 = 1.6;
 /// Crossings that are looked at, of all that there are.
@@ -34,6 +40,8 @@ pub(super) struct Skyline {
     found: Vec<(f64, Place)>,
     /// Length of the lines that would cross it, across each of [`ACROSS`] directions of a half turn, pixels.
     across_px: [f64; ACROSS],
+    /// Of the camera.
+    focal_px: DVec2,
 }
 
 /// A place of it.
@@ -46,6 +54,8 @@ struct Place {
     inverse_depth: f64,
     /// Across the skyline, towards the sky, where that is known.
     normal: Option<DVec2>,
+    /// Where the ground is met there, and its place.
+    ground: Option<(TerrainHit, DVec3)>,
     /// Squared contrast, of the linear range, and path over the exposure, pixels of the camera's focal length.
     contrast2: f64,
     path_px: f64,
@@ -72,9 +82,28 @@ impl Place {
         if !wrong_px.is_finite() {
             return 1.0;
         }
-        // The exposure spreads it over its path.
-        let width_px = moved_px.abs().max(1.0);
-        wrong_px * width_px / (width_px + self.path_px)
+        wrong_px * self.spread(moved_px)
+    }
+
+    /// Part that is left of what is so wide by the exposure, which spreads it over its path.
+    fn spread(&self, px: f64) -> f64 {
+        let width_px = px.abs().max(1.0);
+        width_px / (width_px + self.path_px)
+    }
+
+    /// The same as `wrong_px` of a ground that is drawn higher or lower there.
+    fn lowered_px(&self, detail: &TerrainDetail<'_>, focal_px: DVec2) -> f64 {
+        /// From above the place, metres: as far as may be, and near enough for its digits.
+        const ABOVE_M: f64 = 1000.0;
+        let Some((hit, at_m)) = &self.ground else { return 0.0 };
+        let down_m = detail.drawn_t(&TerrainHit { t: ABOVE_M, ..*hit }, *at_m - ABOVE_M * DVec3::Z, DVec3::Z) - ABOVE_M;
+        let px = |at_m: DVec3| {
+            let in_camera = self.pose.ned_from_camera.inverse() * (at_m - self.pose.position_ned_m);
+            focal_px * in_camera.truncate() / in_camera.z
+        };
+        let moved = px(*at_m + down_m * DVec3::Z) - px(*at_m);
+        let moved_px = self.normal.map_or(moved.length(), |normal| normal.dot(moved).abs());
+        if moved_px.is_finite() { moved_px * moved_px / moved_px.max(1.0) * self.spread(moved_px) } else { 1.0 }
     }
 }
 
@@ -113,6 +142,14 @@ impl Skyline {
         SAFETY * SAFETY * self.found.iter().map(of).sum::<f64>()
     }
 
+    /// The same where it is a ground that is drawn coarser than it is.
+    pub fn lowered(&self, detail: &TerrainDetail<'_>) -> f64 {
+        let of = |(times, place): &(f64, Place)| {
+            times * place.contrast2 * place.lowered_px(detail, self.focal_px) / self.looked_px(place.normal).max(1.0)
+        };
+        SAFETY_OF_GROUND * SAFETY_OF_GROUND * self.found.iter().map(of).sum::<f64>()
+    }
+
     /// Length of the lines across a direction, or any.
     fn looked_px(&self, normal: Option<DVec2>) -> f64 {
         let Some(normal) = normal else { return self.across_px.iter().sum::<f64>() / ACROSS as f64 };
@@ -146,7 +183,11 @@ impl Search<'_> {
         let places: Vec<Option<Place>> =
             crossed.par_iter().step_by(each).map(|[sky_px, surface_px]| self.place_between(*sky_px, *surface_px)).collect();
         let times = crossed.len() as f64 / places.len().max(1) as f64;
-        Skyline { found: places.into_iter().flatten().map(|place| (times, place)).collect(), across_px }
+        Skyline {
+            found: places.into_iter().flatten().map(|place| (times, place)).collect(),
+            across_px,
+            focal_px: self.reach.camera.focal_px,
+        }
     }
 
     /// Where the sky begins between a pixel that shows it and one that does not.
@@ -165,6 +206,7 @@ impl Search<'_> {
             uv,
             inverse_depth: met.depth_m.recip(),
             normal: self.normal(surface_px),
+            ground: met.terrain.map(|hit| (hit, pose.position_ned_m + met.depth_m * way_ned(uv))),
             contrast2: (self.gain)(pixel).powi(2) * contrast.length_squared() / 3.0,
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), uv, met.depth_m.recip(), focal_px).0.length(),
         })
@@ -222,18 +264,16 @@ mod tests {
 
     use std::sync::Arc;
 
-    use glam::DVec3;
-
     use super::*;
     use crate::{
         camera::CameraModel,
         plan::{
             LensReach,
-            contours::tests::{SPEED_M_S, flying_east},
+            contours::tests::{SPEED_M_S, flying_east, flying_east_from},
             surfaces::Surfaces,
         },
         scenario::{LensModel, ShutterSpec},
-        scene::{Encoding, Mesh, Scene, Texture},
+        scene::{Encoding, Mesh, Scene, Terrain, Texture},
         shutter::Shutter,
     };
 
@@ -331,5 +371,34 @@ mod tests {
         pane.material.blends = true;
         let (with, without) = (found(Board { others: vec![pane], ..BOARD }, 0.05), found(BOARD, 0.05));
         assert!(without > 0.0 && (with / without - 1.0).abs() < 1e-9, "{with} {without}");
+    }
+
+    /// A crest whose every other height is 3 m lower, 1500 m to the north and 30 m above the camera: where coarser triangles leave the lower heights out it is drawn 1.5 m higher there in the mean, 1 px at
+    /// most.
+    #[test]
+    fn a_crest_that_is_drawn_coarser_than_it_is_passes_over_as_much_of_the_sky() {
+        let height_m = |row: u32, column: u32| match row.abs_diff(64) {
+            0 if column % 2 == 1 => 157.0,
+            rows => 160.0 - 4.0 * f64::from(rows),
+        };
+        let heights: Vec<f64> = (0..129).flat_map(|row| (0..129).map(move |column| height_m(row, column))).collect();
+        let terrain = Terrain::from_heights(129, 129, 10.0, &heights, None).unwrap();
+        let (path, tangents) = (flying_east_from(DVec3::new(-1500.0, 0.0, -130.0), 0.0), [-0.4, 0.4, -0.3, 0.3]);
+        let scene = Arc::new(Scene { terrain: Some(terrain), sky_linear: [0.0; 3], ..Scene::default() });
+        let shutter = Shutter::from_spec(&ShutterSpec::default(), 5.0, [400, 300]).unwrap();
+        let camera = CameraModel::new([400, 300], [500.0; 2], None, LensModel::Pinhole, &[]).unwrap();
+        let (reach, surfaces) = (LensReach::new(Arc::new(camera)).unwrap(), Surfaces::new(scene.clone()));
+        let search = Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s: 0.0, gain: &|_| 1.0 };
+        let skyline = search.look_around().skyline;
+        let lowered = |max_error_px: f64| {
+            let detail = TerrainDetail::new(scene.terrain.as_ref().unwrap(), &path.pose(0.0), tangents, 500.0, max_error_px);
+            skyline.lowered(&detail)
+        };
+        assert!(lowered(1e-6) < 1e-20);
+        // From 0 to 1 px and back along the crest: of squares a third, in the mean.
+        let contrast2 = skyline.found.iter().map(|(_, place)| place.contrast2).sum::<f64>() / skyline.found.len() as f64;
+        let share = 400.0 / 120_000.0;
+        let expected = SAFETY_OF_GROUND * SAFETY_OF_GROUND * contrast2 * share / 3.0;
+        assert!((0.6..1.6).contains(&(lowered(2.0) / expected)), "{} {expected}", lowered(2.0));
     }
 }

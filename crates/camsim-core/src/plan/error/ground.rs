@@ -1,7 +1,7 @@
 //! How coarse the terrain may be drawn: as far as `quality.max_terrain_error_px` allows in the picture, or as the errors of sources and of the picture allow.
 //!
 //! What is drawn at a probe lies before or behind the full surface along its ray. The full surface shows the same place of its picture above or below that: as far as that looks is how far
-//! the ground is displaced there. In grey levels that costs what any displacement does (`displaced.rs`), and at the ground's borders the pixels that these then pass over (`contours.rs`).
+//! the ground is displaced there. In grey levels that costs what any displacement does (`displaced.rs`), and at the ground's borders the pixels that these then pass over (`contours.rs`), where that is the sky by what is drawn there itself (`skyline.rs`).
 
 use serde::Serialize;
 
@@ -58,7 +58,7 @@ impl Ground {
         Self {
             displaced_px,
             surface_dn: case.shown.displaced_dn(px.into_iter()),
-            borders_dn: case.outlook.map_or(0.0, |outlook| outlook.ground_dn(displaced_px)),
+            borders_dn: case.outlook.map_or(0.0, |outlook| outlook.ground_dn(displaced_px, detail)),
         }
     }
 }
@@ -66,7 +66,7 @@ impl Ground {
 /// The coarsest terrain within the tolerances.
 pub(super) fn coarsest<'a>(case: &Case<'a>, truths: &Truths<'_>) -> Coarsened<'a> {
     let quality = &case.sequence.scenario.quality;
-    let mut error_px = quality.max_terrain_error_px * case.ideal.scale(&case.reach.camera).max(1.0);
+    let mut error_px = quality.max_terrain_error_px * case.ideal.scale(&case.reach.camera);
     let mut tries = 0;
     loop {
         let Some(detail) = case.terrain_detail(error_px) else { return Coarsened { error_px, detail: None, ground: None } };
