@@ -321,15 +321,19 @@ fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
         camsim(&[&["verify", scenario.to_str().unwrap(), "--frames", "0"][..], &small, more].concat())
     };
     // Coarse terrain leaves the source coordinates as they are, and is said beside them.
-    let off_px = |tolerance: &str| {
-        let (_, out, err) = verify(&["--json", "--set", &format!("quality.max_terrain_error_px={tolerance}")]);
+    let off_px = |[terrain_px, dn]: [&str; 2]| {
+        let asked = [format!("quality.max_terrain_error_px={terrain_px}"), format!("quality.max_error_dn={dn}")];
+        let (_, out, err) = verify(&["--json", "--set", &asked[0], "--set", &asked[1]]);
         let report: serde_json::Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{out}{err}"));
         let detail = &report["frames"][0]["level_of_detail"];
         assert!(detail["triangles"].as_u64().unwrap() > 0, "{detail}");
         detail["max_error_px"].as_f64().unwrap()
     };
-    let [fine, coarse] = ["0.25", "20"].map(off_px);
+    let [fine, coarse] = [["0.25", "1"], ["20", "200"]].map(off_px);
     assert!(fine <= 0.25 && coarse > 1.0 && coarse <= 20.0, "{fine} {coarse}");
+    // What the picture may be off by is kept all the same.
+    let within = off_px(["20", "1"]);
+    assert!(within > fine && within < 0.5 * coarse, "{within} {fine} {coarse}");
     let (code, out, err) = verify(&[]);
     assert!(code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")), "{out}{err}");
 }
