@@ -259,13 +259,17 @@ impl FramePlan {
     /// What makes the picture wrong and is no part of its predicted error, for people to read; nothing where nothing is predicted.
     #[must_use]
     pub fn not_in_the_picture(&self) -> Vec<String> {
-        let Predicted { probes, silhouette_share, silhouettes, .. } = self.predicted;
+        let Predicted { probes, silhouette_share, silhouettes, ground, .. } = self.predicted;
         if probes == 0 {
             return Vec::new();
         }
         let paper = (self.preset == Preset::Paper).then(|| "vignette, fog and stored colours as the paper has them".to_owned());
         let ignored = (silhouettes.is_none() && silhouette_share > 0.0).then(|| {
-            format!("silhouettes, which at least {:.0} % of the pixels are at: nobody asks what they cost", 100.0 * silhouette_share)
+            let of_ground = if ground.is_some() { ", and how coarse the terrain's borders are" } else { "" };
+            format!(
+                "silhouettes, which at least {:.0} % of the pixels are at{of_ground}: nobody asks what they cost",
+                100.0 * silhouette_share
+            )
         });
         [ignored, paper].into_iter().flatten().collect()
     }
