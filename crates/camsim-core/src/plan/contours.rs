@@ -108,7 +108,7 @@ impl Outlook {
             hidden_share: holes.share,
             strips: STRIPS * contrast2 * holes.narrow_share
                 + share * mean(&|contour| contour.strip(key_pose, camera.focal_px))
-                + skyline.strips(key_pose, camera.focal_px, plane),
+                + skyline.strips(key_pose, plane),
             steps: unsure * of_probes.max(finer * of_lines),
             steps_apart: of_probes.max(of_lines / finer),
             flush: unsure * finer * over_all(&|crossed| crossed.flush),

@@ -135,9 +135,9 @@ impl Skyline {
     }
 
     /// Mean squared error over the picture, of the linear range, where the ideal frame is that of a camera elsewhere and look-ups of depth begin with a plane.
-    pub fn strips(&self, key_pose: &CameraPose, focal_px: DVec2, plane: &SeenPlane) -> f64 {
+    pub fn strips(&self, key_pose: &CameraPose, plane: &SeenPlane) -> f64 {
         let of = |(times, place): &(f64, Place)| {
-            times * place.contrast2 * place.wrong_px(key_pose, focal_px, plane) / self.looked_px(place.normal).max(1.0)
+            times * place.contrast2 * place.wrong_px(key_pose, self.focal_px, plane) / self.looked_px(place.normal).max(1.0)
         };
         SAFETY * SAFETY * self.found.iter().map(of).sum::<f64>()
     }
@@ -192,7 +192,7 @@ impl Search<'_> {
 
     /// Where the sky begins between a pixel that shows it and one that does not.
     fn place_between(&self, sky_px: DVec2, surface_px: DVec2) -> Option<Place> {
-        let [sky_px, surface_px] = self.halve(sky_px, surface_px, HALVINGS)?;
+        let [sky_px, surface_px] = self.halve(sky_px, surface_px)?;
         let (pose, uv, mid_s) = self.look_at(surface_px)?;
         let way_ned = |uv: DVec2| pose.ned_from_camera * uv.extend(1.0);
         let met = self.surfaces.meet(pose.position_ned_m, way_ned(uv))?;
@@ -236,8 +236,8 @@ impl Search<'_> {
         Some(across * across.dot(towards_sky).signum())
     }
 
-    fn halve(&self, mut sky_px: DVec2, mut surface_px: DVec2, times: u32) -> Option<[DVec2; 2]> {
-        for _ in 0..times {
+    fn halve(&self, mut sky_px: DVec2, mut surface_px: DVec2) -> Option<[DVec2; 2]> {
+        for _ in 0..HALVINGS {
             let middle = sky_px.midpoint(surface_px);
             *(if self.is_sky(middle)? { &mut sky_px } else { &mut surface_px }) = middle;
         }
@@ -307,7 +307,7 @@ mod tests {
         let found = if by_halves { half(false).and(half(true)) } else { skyline(&reach) };
         let key_pose = path.pose(key_s);
         let plane = SeenPlane { camera: key_pose, normal_per_m: 0.01 * DVec3::Z };
-        found.strips(&key_pose, DVec2::splat(FOCAL_PX), &plane)
+        found.strips(&key_pose, &plane)
     }
 
     #[test]
