@@ -240,3 +240,36 @@ fn silhouettes_left_as_they_are_cost_what_is_predicted() {
         );
     }
 }
+
+/// What it costs that hills are drawn coarser than they are.
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_coarser_terrain_costs_what_is_predicted() {
+    let engine = Engine::new(AdapterChoice::Software).expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+    let cases = cases().expect("cases");
+    for name in ["terrain-100", "interlace"] {
+        let case = cases.iter().find(|case| case.name == name).expect("a case");
+        let truth = Truth::new(&Arc::new((*case.sequence).clone())).expect("a truth");
+        // Fine enough that sampling is not what is seen, and a tolerance that leaves the terrain what it is allowed.
+        let coarse = |max_terrain_error_px: f64| {
+            let ideal_scale = Auto::Value(2.0);
+            let quality =
+                QualitySpec { max_terrain_error_px, ideal_scale, max_error_px: 30.0, max_error_dn: 15.0, ..QualitySpec::default() };
+            find(&engine, &truth, &case.sequence, quality)
+        };
+        for allowed_px in [0.02, 1.0, 3.0] {
+            let Found { plan, measured_dn } = coarse(allowed_px);
+            let predicted = &plan.predicted;
+            let ground = predicted.ground.expect("a terrain");
+            let others_dn = predicted.resampling_dn.hypot(predicted.blur_dn).hypot(predicted.displaced_dn);
+            let predicted_dn = others_dn.hypot(ground.surface_dn);
+            let ratio = measured_dn / predicted_dn;
+            eprintln!(
+                "{name} {allowed_px} px: measured {measured_dn:.3}, predicted {predicted_dn:.3} ({:.3} by {:.3} px), ratio {ratio:.2}",
+                ground.surface_dn, ground.displaced_px
+            );
+            assert!((0.6..ABOVE).contains(&ratio), "{name} at {allowed_px} px: {measured_dn:.3} for {predicted_dn:.3}");
+            assert!(allowed_px < 1.0 || ground.surface_dn > others_dn, "{name}: nothing to be seen");
+        }
+    }
+}
