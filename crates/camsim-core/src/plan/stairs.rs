@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::{
     BlurStage,
     levels::{Sampling, sample_count},
-    transfer::{Over, Path, read_waves, sinc},
+    transfer::{Over, Path, PlacedWave, read_waves, sinc},
 };
 use crate::temporal::{Footprint, SAMPLE_PLACES, SAMPLES, TapStage};
 
@@ -32,7 +32,7 @@ const STEP_OF_WAVES: [f64; 3] = [0.618_033_988_749_895, 0.754_877_666_246_693, 0
 /// Direction of the path for the first wave, a quarter of a turn further for each next one: each cell of a grid is read at an instant of its own, so that its
 /// directions are not alike.
 const ALONG: f64 = 0.5;
-const DIRECTIONS: u32 = 4;
+const DIRECTIONS: usize = 4;
 /// Steps of a doubling that widths are told apart by, and paths and samples.
 const STEPS: f64 = 8.0;
 const STEPS_OF_PATH: f64 = 4.0;
@@ -84,7 +84,7 @@ impl Places {
     pub fn left(&self, sampling: &Sampling, blur: Option<BlurStage>) -> f64 {
         let of = |place: &Place| {
             let [width_px, path_px] = place.sides_px.map(|px| sampling.scale * px);
-            let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, sampling.taps);
+            let area = square(width_px, sampling.taps);
             let exposure = blur.map(|blur| (path_px, sample_count(&blur, path_px, &area)));
             place.part * left(&Reading { width_px, taps: sampling.taps, samples_a_pixel: sampling.samples_a_pixel, exposure })
         };
@@ -122,26 +122,34 @@ fn missed_by_rays(rays: u32, path_px: f64) -> f64 {
     (1.0 + 3.0 * path_px.min(1.0) + 0.2 * path_px) * 0.12 / f64::from(rays).powf(1.5)
 }
 
-type Key = (i32, TapStage, u32, Option<(i32, u32)>);
+/// Side of the pixel, reads along it and whether that is one spline, and of an exposure its path and samples.
+type Key = (i32, u32, bool, Option<(i32, u32)>);
 
-/// What has been worked out: the frames of a scene share most of it.
-static KNOWN: LazyLock<RwLock<HashMap<Key, f64>>> = LazyLock::new(RwLock::default);
+/// What has been worked out, for ideal pixels of one sample and of several: the frames of a scene share most of it.
+static KNOWN: LazyLock<RwLock<HashMap<Key, [f64; 2]>>> = LazyLock::new(RwLock::default);
 
 /// Squared error that a border leaves in the picture: mean over pixels, for a contrast of 1 and as many pixel sides of border as pixels.
 pub(super) fn left(reading: &Reading) -> f64 {
     let step = |steps: f64, px: f64| (steps * px.max(1e-3).log2()).round() as i32;
-    let of_path = |(path_px, samples): (f64, u32)| (step(STEPS_OF_PATH, path_px + 1.0), fewer(samples));
-    let key = (step(STEPS, reading.width_px), reading.taps, reading.samples_a_pixel, reading.exposure.map(of_path));
-    if let Some(known) = KNOWN.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
-        return *known;
-    }
-    // Of the step itself: what is known does not depend on who asked first.
     let px = |steps: f64, step: i32| (f64::from(step) / steps).exp2();
-    let exposure = key.3.map(|(path, samples)| (px(STEPS_OF_PATH, path) - 1.0, samples));
-    let found = worked_out(&Reading { width_px: px(STEPS, key.0), taps: key.1, samples_a_pixel: key.2, exposure });
+    let of_path = |(path_px, samples): (f64, u32)| (step(STEPS_OF_PATH, path_px + 1.0), fewer(samples));
+    // Of the steps themselves: what is known does not depend on who asked first.
+    let width = step(STEPS, reading.width_px);
+    let (width_px, path) = (px(STEPS, width), reading.exposure.map(of_path));
+    let area = square(width_px, reading.taps);
+    let key = (width, area.taps[0], area.spline.is_some(), path);
+    let of_samples = usize::from(reading.samples_a_pixel > 1);
+    if let Some(known) = KNOWN.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
+        return known[of_samples];
+    }
+    let found = worked_out(width_px, &area, path.map(|(path, samples)| (px(STEPS_OF_PATH, path) - 1.0, samples)));
     // What is kept is replaced whole.
     KNOWN.write().unwrap_or_else(PoisonError::into_inner).insert(key, found);
-    found
+    found[of_samples]
+}
+
+fn square(width_px: f64, taps: TapStage) -> Footprint {
+    Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps)
 }
 
 /// Of many samples a round number of no more.
@@ -149,35 +157,53 @@ fn fewer(samples: u32) -> u32 {
     if samples <= 8 { samples } else { ((STEPS_OF_PATH * f64::from(samples).log2() + 1e-9).floor() / STEPS_OF_PATH).exp2() as u32 }
 }
 
-/// What the samples of a pixel leave of a wave: they lie as far on one side of its middle as on the other.
-fn left_by_samples(samples_a_pixel: u32, f: DVec2) -> f64 {
-    if samples_a_pixel < SAMPLES { 1.0 } else { SAMPLE_PLACES.map(|place| (2.0 * PI * place.dot(f)).cos()).iter().sum::<f64>() / 4.0 }
+/// A wave of the borders' spectrum.
+struct Wave {
+    /// Cycles an ideal pixel.
+    f: DVec2,
+    /// What it stands for, squared.
+    weight: f64,
+    /// What the samples of an ideal pixel leave of it, if it has several: they lie as far on one side of its middle as on the other.
+    left_by_samples: f64,
+    placed: PlacedWave,
 }
 
-fn worked_out(&Reading { width_px, taps, samples_a_pixel, exposure }: &Reading) -> f64 {
-    let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
-    let wave = |i: u32| {
+impl Wave {
+    fn new(i: u32) -> Self {
         let i = f64::from(i) + 0.5;
         let [direction, beside_x, beside_y] = STEP_OF_WAVES.map(|step| (i * step).fract());
         let length = LOWEST * (OCTAVES * i / f64::from(WAVES)).exp2();
-        (length, [length * DVec2::from_angle(PI * direction), DVec2::new(beside_x, beside_y)])
-    };
-    let of_direction = |direction: u32| -> f64 {
+        let f = length * DVec2::from_angle(PI * direction);
+        // The other half-plane is its mirror image.
+        let stands_for = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
+        Self {
+            f,
+            weight: stands_for / (4.0 * (PI * length).powi(3)),
+            left_by_samples: SAMPLE_PLACES.map(|place| (2.0 * PI * place.dot(f)).cos()).iter().sum::<f64>() / f64::from(SAMPLES),
+            placed: PlacedWave::new(f, DVec2::new(beside_x, beside_y)),
+        }
+    }
+}
+
+/// Those of each direction of the path.
+static TABLE: LazyLock<[Vec<Wave>; DIRECTIONS]> =
+    LazyLock::new(|| std::array::from_fn(|first| (first as u32..WAVES).step_by(DIRECTIONS).map(Wave::new).collect()));
+
+/// Of ideal pixels of one sample and of several.
+fn worked_out(width_px: f64, area: &Footprint, exposure: Option<(f64, u32)>) -> [f64; 2] {
+    let of_direction = |(direction, waves): (u32, &Vec<Wave>)| {
         let along = DVec2::from_angle(ALONG + 0.5 * PI * f64::from(direction));
         let path = exposure.map(|(path_px, samples)| Path { along: path_px * along, samples });
-        let (lengths, waves): (Vec<f64>, Vec<[DVec2; 2]>) = (direction..WAVES).step_by(DIRECTIONS as usize).map(wave).unzip();
-        let found = read_waves(&waves, &area, path.map_or(Over::Instant, Over::Samples));
-        let square = |((&length, &[f, _]), found): ((&f64, &[DVec2; 2]), DVec2)| {
-            // The other half-plane is its mirror image.
-            let weight = 2.0 * length * length * LN_2 * OCTAVES * PI / f64::from(WAVES);
+        let found = read_waves(waves.iter().map(|wave| &wave.placed), area, path.map_or(Over::Instant, Over::Samples));
+        waves.iter().zip(found).fold(DVec2::ZERO, |sum, (&Wave { f, weight, left_by_samples, .. }, found)| {
             let exact = sinc(width_px * f.x) * sinc(width_px * f.y) * path.map_or(1.0, |path| sinc(path.along.dot(f)));
-            weight / (4.0 * (PI * length).powi(3)) * (left_by_samples(samples_a_pixel, f) * found - DVec2::new(exact, 0.0)).length_squared()
-        };
-        lengths.iter().zip(&waves).zip(found).map(square).sum()
+            let off2 = |left: f64| (left * found - DVec2::new(exact, 0.0)).length_squared();
+            sum + weight * DVec2::new(off2(1.0), off2(left_by_samples))
+        })
     };
-    let square: f64 = (0..DIRECTIONS).map(of_direction).sum();
+    let squares: DVec2 = (0..).zip(TABLE.iter()).map(of_direction).sum();
     // A border of a length in output pixels is as many times longer in ideal pixels as those are smaller, their area by the square of it.
-    square / width_px
+    (squares / width_px).to_array()
 }
 
 #[cfg(test)]
@@ -188,13 +214,18 @@ mod tests {
         temporal::{ColorImage, edges::ray_place, gather},
     };
 
+    /// What is told of a reading itself.
+    fn told(&Reading { width_px, taps, samples_a_pixel, exposure }: &Reading) -> f64 {
+        worked_out(width_px, &square(width_px, taps), exposure)[usize::from(samples_a_pixel > 1)]
+    }
+
     /// The same by drawing borders: in all places and directions, each read by the very gather of the twin, beside the area that it truly covers.
     fn measured(reading: &Reading) -> f64 {
         const SIDE: u32 = 40;
         const BORDERS: u32 = 2400;
         const PLACES: u32 = 24;
         let Reading { width_px, taps, samples_a_pixel, exposure } = *reading;
-        let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
+        let area = square(width_px, taps);
         let part = |k: u32, step: f64| (f64::from(k + 1) * step).fract();
         let path = exposure.map_or(0.0, |(path_px, _)| path_px);
         let reach_px = 0.5 * path + width_px + 3.0;
@@ -234,10 +265,10 @@ mod tests {
             for taps in [TapStage::Bilinear, TapStage::Spline, grid].into_iter().filter(|taps| width_px <= 3.0 || *taps == grid) {
                 let exposures = [None, Some((1.0, 2)), Some((6.0, 6)), Some((6.0, 20))];
                 for (exposure, samples_a_pixel) in exposures.into_iter().flat_map(|exposure| [(exposure, 1), (exposure, SAMPLES)]) {
-                    let area = Footprint::new(width_px * DVec2::X, width_px * DVec2::Y, taps);
+                    let area = square(width_px, taps);
                     let at_least = |(path_px, samples): (f64, u32)| (path_px, samples.max(area.taps[0] * area.taps[1]));
                     let reading = Reading { width_px, taps, samples_a_pixel, exposure: exposure.map(at_least) };
-                    let (told, found) = (worked_out(&reading), measured(&reading));
+                    let (told, found) = (told(&reading), measured(&reading));
                     let off = (told / found).sqrt();
                     // Of long paths the waves across them count for too much. Sixteen reads ask for more waves: 4608 tell 0.96 of what is measured.
                     // Several samples leave little, of which each wave that is not looked at is more: 0.89 to 1.83 times, in the median 1.0. Most is for a path, as above.
@@ -289,11 +320,11 @@ mod tests {
     #[test]
     fn what_is_known_is_what_was_worked_out() {
         let reading = Reading { width_px: 2.0, taps: TapStage::Bilinear, samples_a_pixel: 1, exposure: Some((7.0, 8)) };
-        assert_eq!([left(&reading), left(&reading)], [worked_out(&reading); 2]);
+        assert_eq!([left(&reading), left(&reading)], [told(&reading); 2]);
         // What lies between the steps is as far off as these are apart, and not more sure of itself for samples that are not counted.
         for (width_px, path_px, samples) in [(2.07, 6.2, 9), (1.03, 8.9, 31), (2.9, 2.3, 13)] {
             let between = Reading { width_px, exposure: Some((path_px, samples)), ..reading };
-            let off = (left(&between) / worked_out(&between)).sqrt();
+            let off = (left(&between) / told(&between)).sqrt();
             assert!((0.93..1.15).contains(&off), "{between:?}: {off:.3}");
         }
         assert!((1..400).all(|samples| fewer(samples) <= samples && 5 * fewer(samples) >= 4 * samples - 1));

@@ -66,15 +66,6 @@ fn catmull_rom(f: f64) -> f64 {
     (3.0 * (one * one - two) - (3.0 * two * two - 2.0 * two - sinc(4.0 * f))) / (PI * f).powi(2)
 }
 
-/// A read of the ideal frame along one axis; softness as of [`Footprint::spline`], `None` is bilinear.
-fn read(softness: Option<f64>, f: f64) -> f64 {
-    match softness {
-        None => sinc(f).powi(2),
-        Some(soft) if soft > 0.0 => (1.0 - soft) * catmull_rom(f) + soft * sinc(f).powi(4),
-        Some(_) => catmull_rom(f),
-    }
-}
-
 /// `n` samples evenly over a stretch of `x` cycles.
 pub(super) fn evenly(n: u32, x: f64) -> f64 {
     mean_of(n, x / f64::from(n))
@@ -90,22 +81,6 @@ pub(super) struct Path {
 /// A complex number: what is left of a wave, and how far it is shifted.
 pub(super) type Wave = DVec2;
 
-/// One axis of a wave that looks like another on the grid of ideal pixels.
-struct Alias {
-    seen: f64,
-    /// What a read leaves of it, turned as the read's place turns it.
-    read: Wave,
-}
-
-/// A wave along one axis and the slowest two that look like it.
-fn aliases(softness: Option<f64>, f: f64, beside_px: f64) -> [Alias; 3] {
-    [-1.0, 0.0, 1.0].map(|step: f64| {
-        let away = step - f.round();
-        let seen = f + away;
-        Alias { seen, read: read(softness, seen) * turned_by(away * beside_px) }
-    })
-}
-
 /// What reads are taken over.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Over {
@@ -117,49 +92,120 @@ pub(super) enum Over {
     Samples(Path),
 }
 
-/// A read of a wave or of one that looks like it on the grid of ideal pixels.
-struct Read {
+/// One axis of a wave that looks like another on the grid of ideal pixels.
+#[derive(Clone, Copy)]
+struct Alias {
+    /// Whole cycles between the two, and what is left.
+    away: i32,
+    seen: f64,
+    /// What reads leave of it: a bilinear one, and the two kernels that a spline is mixed of.
+    bilinear: f64,
+    sharp: f64,
+    soft: f64,
+}
+
+impl Alias {
+    /// The slowest three.
+    fn all(f: f64) -> [Self; 3] {
+        [-1, 0, 1].map(|step| Self::new(f, step))
+    }
+
+    fn new(f: f64, step: i32) -> Self {
+        let away = step - f.round() as i32;
+        let seen = f + f64::from(away);
+        Self { away, seen, bilinear: sinc(seen).powi(2), sharp: catmull_rom(seen), soft: sinc(seen).powi(4) }
+    }
+
+    /// What a read leaves of it; softness as of [`Footprint::spline`].
+    fn read(&self, softness: Option<f64>) -> f64 {
+        softness.map_or(self.bilinear, |soft| self.sharp + soft * (self.soft - self.sharp))
+    }
+}
+
+/// Reads of waves and of those that look like them on the grid of ideal pixels.
+#[derive(Default)]
+struct Reads {
     /// Which of the waves.
-    of: usize,
+    of: Vec<u32>,
     /// Cycles an ideal pixel.
-    f: DVec2,
+    x: Vec<f32>,
+    y: Vec<f32>,
     /// What one read leaves.
-    leaves: Wave,
+    leaves: Vec<Wave>,
 }
 
-/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far as they count.
-fn reads_of(of: usize, f: DVec2, area: &Footprint, beside_px: DVec2) -> impl Iterator<Item = Read> {
-    let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
-    let both = (0..9).map(move |i| {
-        let (x, y) = (&x[i / 3], &y[i % 3]);
-        Read { of, f: DVec2::new(x.seen, y.seen), leaves: x.read.rotate(y.read) }
-    });
-    both.filter(|read| read.leaves.length_squared() >= UNSEEN * UNSEEN)
-}
+impl Reads {
+    /// For so many waves, each with about as many others that count as there are.
+    fn of_waves(count: usize) -> Self {
+        let most = 5 * count;
+        let cycles = || Vec::with_capacity(most);
+        Self { of: Vec::with_capacity(most), x: cycles(), y: cycles(), leaves: Vec::with_capacity(most) }
+    }
 
-/// What reading the ideal frame leaves of waves, each with the place between ideal pixels where it is read.
-pub(super) fn read_waves(waves: &[[DVec2; 2]], area: &Footprint, over: Over) -> Vec<Wave> {
-    let reads: Vec<Read> = waves.iter().enumerate().flat_map(|(of, &[f, beside_px])| reads_of(of, f, area, beside_px)).collect();
-    sum_of(&reads, waves.len(), area, over)
-}
-
-/// What is left of so many waves, four reads at a time.
-fn sum_of(reads: &[Read], count: usize, area: &Footprint, over: Over) -> Vec<Wave> {
-    let sampler = Sampler::new(area, over);
-    let mut left = vec![Wave::ZERO; count];
-    for four in reads.chunks(4) {
-        let of_four = |value: &dyn Fn(&Read) -> f64| Vec4::from_array(std::array::from_fn(|i| four.get(i).map_or(0.0, value) as f32));
-        let sampled = sampler.leaves(Frequencies4 { x: of_four(&|read| read.f.x), y: of_four(&|read| read.f.y) });
-        for (i, read) in four.iter().enumerate() {
-            left[read.of] += read.leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
+    /// Those of one wave, as far as they count; `turned` by where it is read, for so many whole cycles along x and y.
+    fn add(&mut self, of: usize, [along_x, along_y]: &[[Alias; 3]; 2], area: &Footprint, turned: impl Fn([usize; 2]) -> Wave) {
+        let by_y = [0, 1, 2].map(|k: usize| along_y[k].read(area.spline.map(|softness| softness.y)));
+        for (i, x) in along_x.iter().enumerate() {
+            let by_x = x.read(area.spline.map(|softness| softness.x));
+            for (k, y) in along_y.iter().enumerate() {
+                let by_both = by_x * by_y[k];
+                if by_both.abs() >= UNSEEN {
+                    self.of.push(of as u32);
+                    self.x.push(x.seen as f32);
+                    self.y.push(y.seen as f32);
+                    self.leaves.push(by_both * turned([i, k]));
+                }
+            }
         }
     }
-    left
+
+    /// What is left of so many waves, four reads at a time.
+    fn sum(mut self, count: usize, area: &Footprint, over: Over) -> Vec<Wave> {
+        let (sampler, reads) = (Sampler::new(area, over), self.of.len());
+        for cycles in [&mut self.x, &mut self.y] {
+            cycles.resize(reads.next_multiple_of(4), 0.0);
+        }
+        let mut left = vec![Wave::ZERO; count];
+        let fours = self.x.chunks_exact(4).zip(self.y.chunks_exact(4));
+        for ((x, y), (of, leaves)) in fours.zip(self.of.chunks(4).zip(self.leaves.chunks(4))) {
+            let sampled = sampler.leaves(Frequencies4 { x: Vec4::from_slice(x), y: Vec4::from_slice(y) });
+            for (i, (&of, leaves)) in of.iter().zip(leaves).enumerate() {
+                left[of as usize] += leaves.rotate(Wave::new(f64::from(sampled.re[i]), f64::from(sampled.im[i])));
+            }
+        }
+        left
+    }
+}
+
+/// A wave that is always read at the same place between ideal pixels.
+pub(super) struct PlacedWave {
+    aliases: [[Alias; 3]; 2],
+    /// Of each alias along x and y, by that place.
+    turned: [[Wave; 3]; 2],
+}
+
+impl PlacedWave {
+    /// Cycles an ideal pixel, and the place beside an ideal pixel.
+    pub fn new(f: DVec2, beside_px: DVec2) -> Self {
+        let aliases = [Alias::all(f.x), Alias::all(f.y)];
+        let turned = [0, 1].map(|k: usize| aliases[k].map(|alias| turned_by(f64::from(alias.away) * beside_px[k])));
+        Self { aliases, turned }
+    }
+}
+
+/// What reading the ideal frame leaves of waves.
+pub(super) fn read_waves<'a>(waves: impl ExactSizeIterator<Item = &'a PlacedWave>, area: &Footprint, over: Over) -> Vec<Wave> {
+    let count = waves.len();
+    let mut reads = Reads::of_waves(count);
+    for (of, PlacedWave { aliases, turned }) in waves.enumerate() {
+        reads.add(of, aliases, area, |[x, y]| turned[0][x].rotate(turned[1][y]));
+    }
+    reads.sum(count, area, over)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{exact::read, *};
     use crate::temporal::ColorImage;
 
     /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.

@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-use super::{Over, Path, Read, Wave, evenly, reads_of, sinc};
+use super::{Over, Path, UNSEEN, Wave, catmull_rom, evenly, sinc, turned_by};
 use crate::temporal::Footprint;
 
 /// What is left of a wave, read beside ideal pixels by so much.
 pub(super) fn read_wave(f: DVec2, area: &Footprint, over: Over, beside_px: DVec2) -> Wave {
-    reads_of(0, f, area, beside_px).map(|Read { f, leaves, .. }| leaves.rotate(sampled(area, over, f))).sum()
+    reads_of(f, area, beside_px).map(|Read { f, leaves }| leaves.rotate(sampled(area, over, f))).sum()
 }
 
 /// What the grid of taps and the samples of an exposure leave.
@@ -27,4 +27,47 @@ pub(super) fn sampled(area: &Footprint, over: Over, f: DVec2) -> Wave {
             (0..samples).map(|k| Wave::from_angle(2.0 * PI * at(k).dot(f))).sum::<Wave>() / f64::from(samples)
         }
     }
+}
+
+/// A read of the ideal frame along one axis; softness as of [`Footprint::spline`], `None` is bilinear.
+pub(super) fn read(softness: Option<f64>, f: f64) -> f64 {
+    match softness {
+        None => sinc(f).powi(2),
+        Some(soft) if soft > 0.0 => (1.0 - soft) * catmull_rom(f) + soft * sinc(f).powi(4),
+        Some(_) => catmull_rom(f),
+    }
+}
+
+/// One axis of a wave that looks like another on the grid of ideal pixels.
+struct Alias {
+    seen: f64,
+    /// What a read leaves of it, turned as the read's place turns it.
+    read: Wave,
+}
+
+/// A wave along one axis and the slowest two that look like it.
+fn aliases(softness: Option<f64>, f: f64, beside_px: f64) -> [Alias; 3] {
+    [-1.0, 0.0, 1.0].map(|step: f64| {
+        let away = step - f.round();
+        let seen = f + away;
+        Alias { seen, read: read(softness, seen) * turned_by(away * beside_px) }
+    })
+}
+
+/// A read of a wave or of one that looks like it on the grid of ideal pixels.
+struct Read {
+    /// Cycles an ideal pixel.
+    f: DVec2,
+    /// What one read leaves.
+    leaves: Wave,
+}
+
+/// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far as they count.
+fn reads_of(f: DVec2, area: &Footprint, beside_px: DVec2) -> impl Iterator<Item = Read> {
+    let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
+    let both = (0..9).map(move |i| {
+        let (x, y) = (&x[i / 3], &y[i % 3]);
+        Read { f: DVec2::new(x.seen, y.seen), leaves: x.read.rotate(y.read) }
+    });
+    both.filter(|read| read.leaves.length_squared() >= UNSEEN * UNSEEN)
 }

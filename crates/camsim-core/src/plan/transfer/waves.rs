@@ -8,7 +8,7 @@ use std::{
 
 use glam::{DMat2, DVec2};
 
-use super::{Footprint, Over, Read, UNSEEN, Wave, catmull_rom, sinc, sum_of, turned_by};
+use super::{Alias, Footprint, Over, Reads, Wave, sinc, turned_by};
 use crate::plan::{grain::Spectrum, surface_filter::SurfaceFilter};
 
 /// Frequencies that count, cycles an ideal pixel: two an octave from the lowest up, in six directions of a half-plane.
@@ -36,37 +36,13 @@ struct Known {
     aliases: [[Alias; 3]; 2],
 }
 
-/// One axis of a wave that looks like another on the grid of ideal pixels.
-struct Alias {
-    /// Whole cycles between the two, and what is left.
-    away: i32,
-    seen: f64,
-    /// What reads leave of it: a bilinear one, and the two kernels that a spline is mixed of.
-    bilinear: f64,
-    sharp: f64,
-    soft: f64,
-}
-
 impl Known {
     fn new([i, j]: [u32; 2]) -> Self {
         let length = LOWEST * ((f64::from(i) + 0.5) / f64::from(AN_OCTAVE)).exp2();
         let f = length * DVec2::from_angle(PI * (f64::from(j) + 0.5) / f64::from(DIRECTIONS));
         // Of a half-plane: the other half is its mirror image.
         let weight = 2.0 * length * length * LN_2 / f64::from(AN_OCTAVE) * PI / f64::from(DIRECTIONS);
-        Self { f, weight, aliases: [0, 1].map(|k| [-1, 0, 1].map(|step| Alias::new(f[k], step))) }
-    }
-}
-
-impl Alias {
-    fn new(f: f64, step: i32) -> Self {
-        let away = step - f.round() as i32;
-        let seen = f + f64::from(away);
-        Self { away, seen, bilinear: sinc(seen).powi(2), sharp: catmull_rom(seen), soft: sinc(seen).powi(4) }
-    }
-
-    /// What a read leaves of it; softness as of [`Footprint::spline`].
-    fn read(&self, softness: Option<f64>) -> f64 {
-        softness.map_or(self.bilinear, |soft| self.sharp + soft * (self.soft - self.sharp))
+        Self { f, weight, aliases: [Alias::all(f.x), Alias::all(f.y)] }
     }
 }
 
@@ -109,31 +85,17 @@ impl Waves {
 
     /// What reading the ideal frame leaves of each, over the path or with its samples. `beside_px` is where the source lies between ideal pixels.
     pub fn read(&self, area: &Footprint, over: Over, beside_px: DVec2) -> Vec<Wave> {
-        sum_of(&self.reads(area, beside_px), self.0.len(), area, over)
-    }
-
-    /// A single read of each, and of what looks like it, as far as that counts.
-    fn reads(&self, area: &Footprint, beside_px: DVec2) -> Vec<Read> {
         // Turns of whole cycles by the place of the read.
         let turns =
             |beside_px: f64| -> [Wave; 2 * MOST_AWAY + 1] { std::array::from_fn(|i| turned_by((i as f64 - MOST_AWAY as f64) * beside_px)) };
         let turns = [turns(beside_px.x), turns(beside_px.y)];
         let turn = |k: usize, away: i32| turns[k][(away + MOST_AWAY as i32) as usize];
-        let mut reads = Vec::with_capacity(5 * self.0.len());
+        let mut reads = Reads::of_waves(self.0.len());
         for (of, wave) in self.0.iter().enumerate() {
-            let [along_x, along_y] = &TABLE[wave.index].aliases;
-            for x in along_x {
-                let by_x = x.read(area.spline.map(|softness| softness.x));
-                for y in along_y {
-                    let by_both = by_x * y.read(area.spline.map(|softness| softness.y));
-                    if by_both.abs() >= UNSEEN {
-                        let turned = turn(0, x.away).rotate(turn(1, y.away));
-                        reads.push(Read { of, f: DVec2::new(x.seen, y.seen), leaves: by_both * turned });
-                    }
-                }
-            }
+            let aliases = &TABLE[wave.index].aliases;
+            reads.add(of, aliases, area, |[x, y]| turn(0, aliases[0][x].away).rotate(turn(1, aliases[1][y].away)));
         }
-        reads
+        reads.sum(self.0.len(), area, over)
     }
 }
 
@@ -149,7 +111,7 @@ mod tests {
     use crate::{
         plan::{
             SurfaceReads,
-            transfer::{Path, exact::read_wave, read_waves},
+            transfer::{Path, PlacedWave, exact::read_wave, read_waves},
         },
         temporal::TapStage,
     };
@@ -166,7 +128,8 @@ mod tests {
             for over in samples.into_iter().chain([Over::Instant, Over::All(along)]) {
                 let beside_px = DVec2::new(0.37, 0.81);
                 let all: Vec<DVec2> = waves.0.iter().map(|wave| TABLE[wave.index].f).collect();
-                let of_any = read_waves(&all.iter().map(|&f| [f, beside_px]).collect::<Vec<_>>(), &area, over);
+                let placed: Vec<PlacedWave> = all.iter().map(|&f| PlacedWave::new(f, beside_px)).collect();
+                let of_any = read_waves(placed.iter(), &area, over);
                 for ((&f, found), of_any) in all.iter().zip(waves.read(&area, over, beside_px)).zip(of_any) {
                     let expected = read_wave(f, &area, over, beside_px);
                     let off = found.distance(expected).max(of_any.distance(expected));
