@@ -80,9 +80,11 @@ pub use stages::{BlurStage, NodeDepths, PathStage, RayStage, SurfaceReads, Tempo
 
 /// Nearest distance that the ideal frame can show, metres.
 pub const NEAR_M: f64 = 0.05;
-/// Frames and groups of which what was found is remembered: as many as are looked at together, and to spare for threads that are ahead.
-const FRAMES_KEPT: usize = 64;
-const GROUPS_KEPT: usize = 4;
+/// Frames and groups of which what was found is remembered: so many, and more for each group that is looked at at once.
+const FRAMES_KEPT: usize = 48;
+const FRAMES_OF_GROUP_KEPT: usize = 16;
+const GROUPS_KEPT: usize = 2;
+const GROUPS_OF_GROUP_KEPT: usize = 2;
 /// Times that an exposure whose path the probes find to be missed gets more nodes.
 const MOST_REFINEMENTS: u32 = 3;
 
@@ -157,6 +159,8 @@ impl Planner {
             .map(|halves| halves.each_ref().map(|half: &Arc<LensReach>| [false, true].map(|low| Arc::new(half.with_half_of_these(low)))));
         let truth = channels.iter().any(|c| matches!(c, Channel::Depth | Channel::Coords));
         let max_ideal_px = MAX_IDEAL_PX;
+        let frames_kept = FRAMES_KEPT + FRAMES_OF_GROUP_KEPT * Self::groups_at_once();
+        let groups_kept = GROUPS_KEPT + GROUPS_OF_GROUP_KEPT * Self::groups_at_once();
         Ok(Self {
             sequence,
             shutter,
@@ -170,9 +174,9 @@ impl Planner {
             truth,
             max_side_px,
             max_ideal_px,
-            surroundings: Kept::new(FRAMES_KEPT),
-            surroundings_by_half: Kept::new(FRAMES_KEPT),
-            groups: Kept::new(GROUPS_KEPT),
+            surroundings: Kept::new(frames_kept),
+            surroundings_by_half: Kept::new(frames_kept),
+            groups: Kept::new(groups_kept),
             last: Kept::new(1),
         })
     }

@@ -3,7 +3,14 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::{LensReach, borders::Crossed, probes::Probe, prospect::path_px, skyline::Skyline, surfaces::Surfaces};
+use super::{
+    LensReach,
+    borders::Crossed,
+    probes::Probe,
+    prospect::path_px,
+    skyline::Skyline,
+    surfaces::{Met, Surfaces},
+};
 use crate::{
     mount::CameraPath,
     pose::CameraPose,
@@ -13,6 +20,9 @@ use crate::{
 
 /// Lines of three through three by three places, the border's first.
 pub(super) const LINES: [[usize; 3]; 8] = [[0, 1, 2], [6, 7, 8], [0, 3, 6], [2, 5, 8], [3, 4, 5], [1, 4, 7], [0, 4, 8], [2, 4, 6]];
+
+/// Times the farthest that nine places see without a step between them: nothing farther is seen among them.
+const BEHIND: f64 = 1.05;
 
 /// A frame in which they are looked for.
 pub(super) struct Search<'a> {
@@ -155,7 +165,16 @@ impl Search<'_> {
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
         // Between places 3 px apart a crease bends threefold.
         let is_fold = |line: &[usize; 3]| bends(line.map(|i| inverse_depth[i]), f64::from(NEAR_PX) * FOLD);
-        let crossed = if self.surfaces.has_models() { self.crossed(number, probe) } else { Crossed::default() };
+        // What is narrower than these places is there only where models are; where the ground steps, lines tell how often.
+        let may_show_models = || {
+            let ways = places.map(uv);
+            let (low, high) = ways.iter().fold((ways[0], ways[0]), |(low, high), way| (low.min(*way), high.max(*way)));
+            let range_m = |(way, met): (&DVec2, &Option<Met>)| met.map_or(f64::INFINITY, |met| met.depth_m * way.extend(1.0).length());
+            let farthest_m = ways.iter().zip(&met).map(range_m).fold(0.0, f64::max);
+            self.surfaces.may_show_models(&pose, [low.x, high.x, low.y, high.y], BEHIND * farthest_m)
+        };
+        let has_lines = self.surfaces.has_models() && (!across.is_empty() || may_show_models());
+        let crossed = if has_lines { self.crossed(number, probe) } else { Crossed::default() };
         let is_ground = |pair: &&[usize; 2]| {
             let [a, b] = **pair;
             let nearer = if inverse_depth[a] > inverse_depth[b] { a } else { b };
@@ -191,5 +210,63 @@ impl Search<'_> {
             of_ground,
             is_sky: met[4].is_none(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use std::sync::Arc;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        camera::CameraModel,
+        plan::contours::tests::flying_east_from,
+        scenario::{LensModel, ShutterSpec},
+        scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, Texture, Wrap},
+    };
+
+    /// Thin masts, some on each of the hills below.
+    fn masts() -> Vec<Mesh> {
+        let texture = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
+        let mast = |i: u32| {
+            let part = |step: f64| (f64::from(i) * step).fract() - 0.5;
+            let foot = DVec3::new(1200.0 * part(0.618), 1200.0 * part(0.755), 0.0);
+            let corners =
+                [[-0.4, 0.0, 30.0], [0.4, 0.0, 30.0], [0.4, 0.0, -40.0], [-0.4, 0.0, -40.0], [0.0, 0.6, -40.0], [0.0, 0.6, 30.0_f32]];
+            let vertices = corners.map(|corner| MeshVertex::new(corner, [0.0; 2])).to_vec();
+            Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3, 3, 2, 4, 0, 1, 5], texture.clone(), foot, Wrap::Clamp)
+        };
+        (0..200).map(mast).collect()
+    }
+
+    #[test]
+    fn lines_are_left_out_only_where_they_cross_nothing() {
+        let heights: Vec<f64> =
+            (0..161 * 161).map(|i| 15.0 * (f64::from(i % 161) * 0.11).sin() * (f64::from(i / 161) * 0.07).cos()).collect();
+        let terrain = Terrain::from_heights(161, 161, 10.0, &heights, None).unwrap();
+        let surfaces = Surfaces::new(Arc::new(Scene { terrain: Some(terrain), meshes: masts(), ..Scene::default() }));
+        let shutter = Shutter::from_spec(&ShutterSpec { readout_ms: 60.0, ..ShutterSpec::default() }, 5.0, [400, 300]).unwrap();
+        let camera = CameraModel::new([400, 300], [300.0; 2], None, LensModel::Pinhole, &[]).unwrap();
+        let (reach, gain) = (LensReach::new(Arc::new(camera)).unwrap(), |_: [u32; 2]| 1.0);
+        let (mut left_out, mut found) = (0, 0);
+        for up_deg in [-90.0, -50.0, -20.0] {
+            let path = flying_east_from(DVec3::new(-200.0, 0.0, -250.0), up_deg);
+            for frame in 0..6 {
+                let stamp_s = 0.1 * f64::from(frame) - 0.3;
+                let search = Search { reach: &reach, surfaces: &surfaces, path: &path, shutter: &shutter, stamp_s, gain: &gain };
+                let around = search.look_around().around;
+                for (number, (probe, around)) in reach.probes.iter().zip(&around).enumerate() {
+                    let crossed = search.crossed(number, probe);
+                    assert_eq!(around.crossed, crossed, "{up_deg} {frame}: {:?}", probe.pixel);
+                    left_out += usize::from(crossed == Crossed::default());
+                    found += usize::from(crossed != Crossed::default());
+                }
+            }
+        }
+        assert!(left_out > 5000 && found > 100, "{left_out} {found}");
     }
 }

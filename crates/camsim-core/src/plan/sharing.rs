@@ -28,6 +28,9 @@ const WORTH: f64 = 0.1;
 const MOST_AREA: f64 = 4.0;
 /// Parts of `quality.max_error_dn` that a frame is sampled for, one after the other, so that the others keep all of it. Neighbours differ by a few percent.
 const SHARES: [f64; 3] = [0.95, 1.0, 0.85];
+/// Threads for each group that is looked at at once, and such groups at most.
+const THREADS_A_GROUP: usize = 2;
+const MOST_AT_ONCE: usize = 8;
 /// From so many frames on the halves of a group are tried each for itself.
 const FAR: u64 = 8;
 
@@ -151,6 +154,12 @@ impl Planner {
     #[must_use]
     pub fn group_of(&self, frame: u64) -> u64 {
         if self.may_share() { frame / u64::from(self.sequence.scenario.quality.frames_per_ideal) } else { frame }
+    }
+
+    /// Groups that are best planned at once, each by a thread of its own: looking at one is parallel in itself, but not all of it.
+    #[must_use]
+    pub fn groups_at_once() -> usize {
+        (rayon::current_num_threads() / THREADS_A_GROUP).clamp(1, MOST_AT_ONCE)
     }
 
     /// Forgets the groups that were planned. Plans stay the same: for benchmarks, which plan the same frames over and over.

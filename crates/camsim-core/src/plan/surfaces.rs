@@ -23,6 +23,8 @@ pub(super) struct Surfaces {
     /// Boxes around the meshes: of all, of those that may have depth, of those that hide what is behind them, and of those that are mixed with it. A ray
     /// passes through thousands of panes to what is behind them.
     tree: BoxTree,
+    /// Around each mesh.
+    bounds: Vec<Aabb>,
     deep: RayTree,
     solid: RayTree,
     mixed: RayTree,
@@ -148,11 +150,19 @@ impl Surfaces {
         let shape_from_ned = scene.meshes.iter().map(|mesh| mesh.ned_from_shape.inverse()).collect();
         let linear = [Encoding::Linear, Encoding::Srgb].map(|encoding| (encoding, encoding.decode_table()));
         let blends = scene.has_blended();
-        Self { scene, tree, deep, solid, mixed, shapes, shape_from_ned, blends, linear }
+        Self { scene, tree, bounds, deep, solid, mixed, shapes, shape_from_ned, blends, linear }
     }
 
     pub fn terrain(&self) -> Option<&Terrain> {
         self.scene.terrain.as_ref()
+    }
+
+    /// Whether a camera may see anything but ground within `tangents` = [u_min, u_max, v_min, v_max] and so far away.
+    pub fn may_show_models(&self, pose: &CameraPose, tangents: [f64; 4], range_m: f64) -> bool {
+        let frustum = Frustum::new(pose, tangents);
+        let measure = |bounds: &Aabb| (bounds.distance_m(pose.position_ned_m) <= range_m && frustum.may_see(bounds)).then_some(0.0);
+        let of_mesh = |i: u32| measure(&self.bounds[i as usize]).unwrap_or(f64::INFINITY);
+        self.tree.nearest_thing_m(measure, of_mesh) == 0.0
     }
 
     /// Whether there is anything but ground and pictures on it.

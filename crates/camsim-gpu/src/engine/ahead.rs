@@ -157,7 +157,7 @@ impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
     fn begin(&mut self) {
         // One to be taken and one at work at least; more where there are threads for it.
         let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
-        while self.begun.len() < ahead.max(self.together) {
+        while self.begun.len() < ahead.max(Planner::groups_at_once() * self.together) {
             let group = self.next_group();
             if group.is_empty() {
                 return;

@@ -1,5 +1,7 @@
 //! From the device to the host: output buffers, and textures for a look at single stages.
 
+use std::{num::NonZero, thread::available_parallelism};
+
 use camsim_core::plan::{FramePlan, Planner};
 use glam::DVec2;
 use rayon::prelude::*;
@@ -36,14 +38,35 @@ impl Output {
     }
 }
 
+/// Bytes that are worth a thread of their own, and threads at most: the system gives large pictures their memory page by page as it is first written, which takes several times as long as the copy.
+const BYTES_A_THREAD: usize = 8 << 20;
+const MOST_THREADS: usize = 8;
+
 /// Takes the values of a buffer that has been asked to be mapped, and unmaps it.
 pub(super) fn read_mapped<T: bytemuck::Pod>(buffer: &wgpu::Buffer) -> Result<Vec<T>, GpuError> {
     let view = buffer.slice(..).get_mapped_range().map_err(|error| GpuError::Device(error.to_string()))?;
-    // Where it is aligned, as mapped memory is, one copy; the other way fills the numbers with zeros first.
-    let values = bytemuck::try_cast_slice(&view).map_or_else(|_| bytemuck::pod_collect_to_vec(&view), <[T]>::to_vec);
+    let values = copied(&view);
     drop(view);
     buffer.unmap();
     Ok(values)
+}
+
+/// The whole values among so many bytes. Threads are not those of the pool, which may all be at plans.
+fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
+    let bytes = &bytes[..bytes.len() / size_of::<T>() * size_of::<T>()];
+    let threads = (bytes.len() / BYTES_A_THREAD).min(MOST_THREADS).min(available_parallelism().map_or(1, NonZero::get));
+    if threads < 2 {
+        // Where they are aligned, as mapped memory is, one copy; the other way fills the numbers with zeros first.
+        return bytemuck::try_cast_slice(bytes).map_or_else(|_| bytemuck::pod_collect_to_vec(bytes), <[T]>::to_vec);
+    }
+    let mut values: Vec<T> = bytemuck::zeroed_vec(bytes.len() / size_of::<T>());
+    let piece = bytes.len().div_ceil(threads);
+    std::thread::scope(|scope| {
+        for (into, from) in bytemuck::cast_slice_mut::<T, u8>(&mut values).chunks_mut(piece).zip(bytes.chunks(piece)) {
+            scope.spawn(|| into.copy_from_slice(from));
+        }
+    });
+    values
 }
 
 /// Casts the rays that the shader left to the host: those of pixels that may see a silhouette. `phase` is that of the coordinates.
@@ -179,4 +202,18 @@ pub(super) fn read_texture<T: bytemuck::Pod>(
     gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|error| GpuError::Device(error.to_string()))?;
     let all = copied.read::<T>()?;
     Ok(all.chunks_exact(texture.width() as usize).take(height as usize).flat_map(|row| &row[..width as usize]).copied().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_pictures_are_copied_whole_by_several_threads() {
+        for values in [0, 1, 5_000_017, 2 * BYTES_A_THREAD] {
+            let all: Vec<u32> = (0..values as u32).map(|i| i.wrapping_mul(2_654_435_761)).collect();
+            let bytes = [bytemuck::cast_slice(&all), &[1, 2, 3][..]].concat();
+            assert!(copied::<u32>(&bytes) == all, "{values}");
+        }
+    }
 }
