@@ -18,6 +18,9 @@ use crate::{
     temporal::displacement::Twist,
 };
 
+/// Frames of a group whose probes answer together for how much there is of borders.
+const TOGETHER: u64 = 4;
+
 /// A frame before anything is chosen for it.
 #[derive(Clone)]
 pub(super) struct Look<'a> {
@@ -208,8 +211,10 @@ impl<'a> Look<'a> {
         let least_share = truths.share_apart(|probe| own.around[probe].is_beside);
         let (plane, holes) = (truths.plane(), truths.holes(&[self.key()], quality.max_error_px));
         let outlook = |all: &Surroundings| contours::Outlook::new(all, &reach.camera, key_pose, &plane, holes, least_share);
-        let others = if self.has_half { self.surroundings_of_other_half() } else { None };
-        Some(others.map_or_else(|| outlook(&own), |others| outlook(&own.and(others))))
+        if !self.has_half {
+            return Some(outlook(&own));
+        }
+        Some(outlook(&self.surroundings_of_neighbours().fold(Surroundings::clone(&own), |all, others| all.and(others))))
     }
 
     /// What the probes of a frame see around them.
@@ -221,13 +226,15 @@ impl<'a> Look<'a> {
         known.of(frame, || search.look_around())
     }
 
-    /// What is around the probes that this frame of a group leaves to the one beside it, as its own camera would see that: borders are few, and half of them tell
-    /// too little.
-    fn surroundings_of_other_half(&self) -> Option<Surroundings> {
-        let other = self.frame ^ 1;
-        let reach = self.planner.half_the_probes(other).filter(|_| other < self.planner.sequence.frames)?;
+    /// What is around the probes of the frames beside this one in a group, as its own camera would see that: borders are few, and half of the probes of one frame tell too little.
+    fn surroundings_of_neighbours(&self) -> impl Iterator<Item = Surroundings> {
+        let first = self.frame / TOGETHER * TOGETHER;
+        let others = (first..first + TOGETHER).filter(|&other| other != self.frame && other < self.planner.sequence.frames);
         let own_pose = |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(x, y));
-        Some(self.surroundings(other, &reach).seen_from(&reach.probes, own_pose))
+        others.filter_map(move |other| {
+            let reach = self.planner.half_the_probes(other)?;
+            Some(self.surroundings(other, &reach).seen_from(&reach.probes, own_pose))
+        })
     }
 }
 
