@@ -12,6 +12,7 @@ use std::{
 };
 
 use camsim_core::{
+    plan::Planner,
     scenario::{Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, ZoomSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
@@ -179,8 +180,8 @@ fn the_first_fault_stops_everything_and_the_session_goes_on() {
         assert!(matches!(outcome, Err(RenderError::Sink(Full(frame))) if frame == full_at), "{outcome:?}");
         assert!(came.iter().copied().eq(0..=full_at), "{came:?}");
         let begun = planned.load(Ordering::Relaxed);
-        // A frame for each thread, or a group of eight that share an ideal frame; another group, and the next frame.
-        let ahead = rayon::current_num_threads().clamp(8, 16) as u64 + 8 + 1;
+        // A frame for each thread, or as many groups of eight that share an ideal frame as there are threads for; another group, and the next frame.
+        let ahead = rayon::current_num_threads().min(16).max(8 * Planner::groups_at_once()) as u64 + 8 + 1;
         assert!(begun <= full_at + ahead, "{begun} frames were begun for {full_at}");
     }
     // A plan that fails: the frames before it are handed over first.

@@ -72,10 +72,10 @@ pub(super) struct Contour {
 
 impl Around {
     /// The same as a camera elsewhere would see it.
-    pub fn seen_from(&self, pose: CameraPose) -> Self {
+    pub fn seen_from(&self, pose: impl FnOnce() -> CameraPose) -> Self {
         let mut there = self.clone();
         if let Some(contour) = &mut there.contour {
-            contour.pose = pose;
+            contour.pose = pose();
         }
         there
     }
@@ -115,13 +115,18 @@ impl Contour {
 
 impl Surroundings {
     /// With what others see.
-    pub fn and(&self, others: Self) -> Self {
-        Self { around: [&self.around[..], &others.around].concat(), skyline: self.skyline.clone().and(others.skyline) }
+    pub fn with(&self, others: impl Iterator<Item = Self>) -> Self {
+        let mut all = self.clone();
+        for others in others {
+            all.around.extend(others.around);
+            all.skyline = all.skyline.and(others.skyline);
+        }
+        all
     }
 
     /// The same as cameras elsewhere would see it: those of the pixels of a picture.
     pub fn seen_from(&self, probes: &[Probe], pose: impl Fn([u32; 2]) -> CameraPose) -> Self {
-        let around = self.around.iter().zip(probes).map(|(around, probe)| around.seen_from(pose(probe.pixel))).collect();
+        let around = self.around.iter().zip(probes).map(|(around, probe)| around.seen_from(|| pose(probe.pixel))).collect();
         Self { around, skyline: self.skyline.seen_from(pose) }
     }
 }

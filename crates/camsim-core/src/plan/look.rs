@@ -214,7 +214,7 @@ impl<'a> Look<'a> {
         if !self.has_half {
             return Some(outlook(&own));
         }
-        Some(outlook(&self.surroundings_of_neighbours().fold(Surroundings::clone(&own), |all, others| all.and(others))))
+        Some(outlook(&own.with(self.surroundings_of_neighbours())))
     }
 
     /// What the probes of a frame see around them.
