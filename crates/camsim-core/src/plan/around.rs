@@ -170,7 +170,7 @@ impl Search<'_> {
         let contrast2 = |&[a, b]: &[usize; 2]| (color(a) - color(b)).length_squared() / 3.0;
         // Between places 3 px apart a crease bends threefold.
         let is_fold = |line: &[usize; 3]| bends(line.map(|i| inverse_depth[i]), f64::from(NEAR_PX) * FOLD);
-        // What is narrower than these places is there only where models are; where the ground steps, lines tell how often.
+        // Lines are for models, which may be narrower than these places; of ground that steps among them they tell how often.
         let may_show_models = || {
             let ways = places.map(uv);
             let (low, high) = ways.iter().fold((ways[0], ways[0]), |(low, high), way| (low.min(*way), high.max(*way)));

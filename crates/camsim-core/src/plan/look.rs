@@ -228,8 +228,11 @@ impl<'a> Look<'a> {
 
     /// What is around the probes of the frames beside this one in a group, as its own camera would see that: borders are few, and half of the probes of one frame tell too little.
     fn surroundings_of_neighbours(&self) -> impl Iterator<Item = Surroundings> {
-        let first = self.frame / TOGETHER * TOGETHER;
-        let others = (first..first + TOGETHER).filter(|&other| other != self.frame && other < self.planner.sequence.frames);
+        let (planner, frame) = (self.planner, self.frame);
+        let first = frame / TOGETHER * TOGETHER;
+        // The one beside it has the other half, whatever its group is.
+        let is_beside = move |other: u64| other == frame ^ 1 || other != frame && planner.group_of(other) == planner.group_of(frame);
+        let others = (first..first + TOGETHER).filter(move |&other| other < planner.sequence.frames && is_beside(other));
         let own_pose = |[x, y]: [u32; 2]| self.path().pose(self.stamp_s + self.planner.shutter.dt_pixel_s(x, y));
         others.filter_map(move |other| {
             let reach = self.planner.half_the_probes(other)?;

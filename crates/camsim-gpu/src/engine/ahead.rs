@@ -69,18 +69,18 @@ struct View {
     reads: SurfaceReads,
 }
 
-/// Prepares frames; the last triangles are kept for as long as they are seen in the same way.
+/// Prepares frames; the last triangles are kept, of as many groups as are planned at once, for frames that see them in the same way.
 #[derive(Debug)]
 pub(super) struct Preparer {
     planner: Arc<Planner>,
     /// Of the ground's picture, if it is in tiles.
     tiles: Option<Arc<GroundTiles>>,
-    seen: Mutex<Option<(View, Arc<[PlacedMesh]>)>>,
+    seen: Mutex<VecDeque<(View, Arc<[PlacedMesh]>)>>,
 }
 
 impl Preparer {
     pub fn new(planner: Arc<Planner>, tiles: Option<Arc<GroundTiles>>) -> Self {
-        Self { planner, tiles, seen: Mutex::new(None) }
+        Self { planner, tiles, seen: Mutex::default() }
     }
 
     fn prepare(&self, frame: u64) -> Result<Prepared, PlanError> {
@@ -96,7 +96,7 @@ impl Preparer {
         let view = View { poses, ideal: plan.ideal, terrain_error_px: plan.terrain_error_px, reads: plan.surface_reads };
         // What is kept is replaced whole: a panic elsewhere leaves nothing half done.
         let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, meshes)) = seen().as_ref().filter(|(seen, _)| *seen == view) {
+        if let Some((_, meshes)) = seen().iter().find(|(seen, _)| *seen == view) {
             return meshes.clone();
         }
         let focal_px = plan.ideal.focal_px.max_element();
@@ -109,7 +109,11 @@ impl Preparer {
             })
         });
         let meshes: Arc<[PlacedMesh]> = meshes.collect();
-        *seen() = Some((view, meshes.clone()));
+        let mut seen = seen();
+        while seen.len() >= Planner::groups_at_once() {
+            seen.pop_front();
+        }
+        seen.push_back((view, meshes.clone()));
         meshes
     }
 }
@@ -157,7 +161,9 @@ impl<'a, 'scope, I: Iterator<Item = u64>> Ahead<'a, 'scope, I> {
     fn begin(&mut self) {
         // One to be taken and one at work at least; more where there are threads for it.
         let ahead = rayon::current_num_threads().clamp(2, MOST_AHEAD);
-        while self.begun.len() < ahead.max(Planner::groups_at_once() * self.together) {
+        // Parts of one larger group would each look at all of it.
+        let at_once = |together: usize| if together < MOST_TOGETHER { Planner::groups_at_once() } else { 1 };
+        while self.begun.len() < ahead.max(at_once(self.together) * self.together) {
             let group = self.next_group();
             if group.is_empty() {
                 return;

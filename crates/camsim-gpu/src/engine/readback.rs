@@ -1,6 +1,10 @@
 //! From the device to the host: output buffers, and textures for a look at single stages.
 
-use std::{num::NonZero, thread::available_parallelism};
+use std::{
+    num::NonZero,
+    sync::{Mutex, PoisonError},
+    thread::{Builder, available_parallelism},
+};
 
 use camsim_core::plan::{FramePlan, Planner};
 use glam::DVec2;
@@ -61,10 +65,19 @@ fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
     }
     let mut values: Vec<T> = bytemuck::zeroed_vec(bytes.len() / size_of::<T>());
     let piece = bytes.len().div_ceil(threads);
-    std::thread::scope(|scope| {
-        for (into, from) in bytemuck::cast_slice_mut::<T, u8>(&mut values).chunks_mut(piece).zip(bytes.chunks(piece)) {
-            scope.spawn(|| into.copy_from_slice(from));
+    let pieces = Mutex::new(bytemuck::cast_slice_mut::<T, u8>(&mut values).chunks_mut(piece).zip(bytes.chunks(piece)));
+    let next = || pieces.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        while let Some((into, from)) = next() {
+            into.copy_from_slice(from);
         }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            // Where there are no threads to be had this one does all of it.
+            let _ = Builder::new().spawn_scoped(scope, work);
+        }
+        work();
     });
     values
 }
