@@ -337,6 +337,19 @@ mod tests {
     }
 
     #[test]
+    fn models_are_shown_only_within_sight_and_reach() {
+        let surfaces = Surfaces::new(Arc::new(scene()));
+        let above = CameraPose { position_ned_m: DVec3::new(0.0, 10.0, -300.0), ned_from_camera: DQuat::IDENTITY };
+        let tangents = |north: f64| [north - 0.01, north + 0.01, -0.01, 0.01];
+        // Straight down there is one 240 m below; between two of them, and to the side, is ground alone.
+        assert!(surfaces.may_show_models(&above, tangents(0.0), 241.0) && !surfaces.may_show_models(&above, tangents(0.0), 200.0));
+        assert!(
+            !surfaces.may_show_models(&above, tangents(0.19), f64::INFINITY)
+                && !surfaces.may_show_models(&above, tangents(3.0), f64::INFINITY)
+        );
+    }
+
+    #[test]
     fn rays_meet_what_a_look_at_every_triangle_finds() {
         let mut scene = scene();
         // A picture again, turned, as a mesh of the same shape.

@@ -123,7 +123,6 @@ impl Alias {
 }
 
 /// Reads of waves and of those that look like them on the grid of ideal pixels.
-#[derive(Default)]
 struct Reads {
     /// Which of the waves.
     of: Vec<u32>,

@@ -21,8 +21,8 @@ use camsim_core::{
 use super::ms_since;
 use crate::ideal::base_ned_m;
 
-/// Frames that are prepared before they are asked for, at most, with as many threads. Each is some megabytes of triangles and poses where it is planned by itself; those of a group have
-/// one ideal frame's.
+/// Frames that are prepared before they are asked for, at most, with as many threads, where each is planned by itself: some megabytes of triangles and poses. Those of a group have one ideal
+/// frame's, and as many groups are begun as are best planned at once.
 const MOST_AHEAD: usize = 16;
 /// Frames of one group that one thread prepares, at most: as many are ready while as many are begun.
 const MOST_TOGETHER: usize = 16;
