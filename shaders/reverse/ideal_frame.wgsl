@@ -99,18 +99,18 @@ fn spline_around(at_px: vec2<f32>, softness: vec2<f32>) -> Spline {
     return Spline(base - 1.0, base + w2 / w12, base + 2.0, part * w0, part * w12, part * w3);
 }
 
-struct SplineRead {
+struct WeighedRead {
     at_px: vec2<f32>,
     weight: f32,
 }
 
 // The one between, the ones above and below it, the ones left and right of it.
-fn spline_read(spline: Spline, read: u32) -> SplineRead {
+fn spline_read(spline: Spline, read: u32) -> WeighedRead {
     let before = vec2<bool>(read == 3u, read == 1u);
     let after = vec2<bool>(read == 4u, read == 2u);
     let at_px = select(select(spline.between, spline.before, before), spline.after, after);
     let weight = select(select(spline.weight_between, spline.weight_before, before), spline.weight_after, after);
-    return SplineRead(at_px, weight.x * weight.y);
+    return WeighedRead(at_px, weight.x * weight.y);
 }
 
 fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
@@ -122,6 +122,6 @@ fn ideal_color_by_spline(at_px: vec2<f32>, softness: vec2<f32>) -> vec4<f32> {
         + color_of(spline_read(spline, 4u));
 }
 
-fn color_of(read: SplineRead) -> vec4<f32> {
+fn color_of(read: WeighedRead) -> vec4<f32> {
     return read.weight * ideal_color_at(read.at_px);
 }

@@ -18,7 +18,7 @@ pub mod path;
 mod samples;
 
 pub(crate) use footprint::TENT_PX2;
-pub use footprint::{Footprint, TapStage, tap_shares};
+pub use footprint::{Footprint, Kernel, TapStage, WIDEST_AREA_PX, tap_shares};
 pub use samples::{SAMPLE_PLACES, SAMPLES, middle_depth};
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
@@ -298,6 +298,17 @@ impl ColorImage<'_> {
         let sum: DVec3 = reads.iter().map(|&(weight, at)| weight * self.sample(at)).sum();
         sum / reads.iter().map(|read| read.0).sum::<f64>()
     }
+
+    /// Mean over a rectangle around a place, pixels being squares of one colour; edges held. Its sides along x and y, pixels, are 1 and more: with sides of 1 this is the bilinear read.
+    #[must_use]
+    pub fn over_area(&self, at_px: DVec2, sides_px: DVec2) -> DVec3 {
+        let first = (at_px - 0.5 * (sides_px + 1.0)).floor() + 1.0;
+        // Of a pixel so far away the part that is within, of all of the rectangle.
+        let weight = |k: usize, px: f64| (0.5 * (sides_px[k] + 1.0) - (px - at_px[k]).abs()).clamp(0.0, 1.0) / sides_px[k];
+        let count = [0, 1].map(|k: usize| (sides_px[k] + 1.0).ceil() as u32);
+        let pixels = (0..count[1]).flat_map(|y| (0..count[0]).map(move |x| first + DVec2::new(f64::from(x), f64::from(y))));
+        pixels.map(|px| weight(0, px.x) * weight(1, px.y) * self.sample(px)).sum()
+    }
 }
 
 /// Mean colour over the exposure along the path through `nodes_px`, which are equally far apart in time. Each polynomial of the path has its
@@ -331,6 +342,7 @@ mod tests {
     use glam::DQuat;
 
     use super::*;
+    use crate::noise::pcg4d;
 
     /// A tilted plane `n . x = 1` in key coordinates has inverse depth `n . (x/z)`: linear over the image.
     fn plane_image(ideal: &IdealGeometry, normal: DVec3) -> Vec<f32> {
@@ -386,6 +398,32 @@ mod tests {
         let image = InverseDepthImage { size_px: [2, 2], values: &values };
         assert_eq!(image.inverse_depth(DVec2::new(0.4, 0.2)), f64::from(0.1_f32));
         assert_eq!(image.inverse_depth(DVec2::new(0.6, 0.2)), f64::from(0.001_f32));
+    }
+
+    #[test]
+    fn a_mean_over_an_area_is_that_of_the_pixels_in_it() {
+        let size_px = [12, 9];
+        let value = |x: i64, y: i64| f64::from((pcg4d([x.clamp(0, 11) as u32, y.clamp(0, 8) as u32, 5, 6])[0] >> 8) as f32 / 16_777_216.0);
+        let rgba: Vec<f32> = (0..108).flat_map(|i| [value(i % 12, i / 12) as f32, 0.5, 0.25, 1.0]).collect();
+        let color = ColorImage { size_px, rgba: &rgba };
+        for (at_px, sides_px) in [
+            (DVec2::new(5.3, 4.8), DVec2::new(2.3, 3.1)),
+            (DVec2::new(5.5, 4.0), DVec2::new(3.0, 1.0)),
+            (DVec2::new(0.2, 8.9), DVec2::new(4.7, 2.0)),
+            (DVec2::new(-3.0, 14.0), DVec2::new(2.0, 5.0)),
+        ] {
+            // Each pixel's part of the area, by the ends of both: over pixels of a frame whose borders go on.
+            let part = |k: usize, px: i64| {
+                let [begin, end] = [-0.5, 0.5].map(|half| at_px[k] + half * sides_px[k]);
+                ((px as f64 + 0.5).min(end) - (px as f64 - 0.5).max(begin)).max(0.0) / sides_px[k]
+            };
+            let exact: f64 =
+                (-20..40).flat_map(|y| (-20..40).map(move |x| (x, y))).map(|(x, y)| part(0, x) * part(1, y) * value(x, y)).sum();
+            let found = color.over_area(at_px, sides_px);
+            assert!((found - DVec3::new(exact, 0.5, 0.25)).abs().max_element() < 1e-7, "{at_px} {sides_px}: {found} {exact}");
+            let one = color.over_area(at_px, DVec2::ONE);
+            assert!(one.distance(color.sample(at_px)) < 1e-12, "{at_px}: {one}");
+        }
     }
 
     #[test]

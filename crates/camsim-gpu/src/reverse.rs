@@ -356,7 +356,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         max_samples: plan.blur.map_or(1, |blur| blur.max_samples),
         max_taps: match plan.taps {
             TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
-            TapStage::Bilinear | TapStage::Spline => 1,
+            TapStage::Bilinear | TapStage::Spline | TapStage::Area => 1,
         },
         coords_phase,
         light: photometric.light as f32,

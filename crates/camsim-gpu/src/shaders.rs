@@ -83,6 +83,7 @@ embedded![
     "reverse/gather/stretches/one.wgsl",
     "reverse/gather/stretches/several.wgsl",
     "reverse/gather/stretches/two.wgsl",
+    "reverse/gather/tap/area.wgsl",
     "reverse/gather/tap/bilinear.wgsl",
     "reverse/gather/tap/cells.wgsl",
     "reverse/gather/tap/grid.wgsl",

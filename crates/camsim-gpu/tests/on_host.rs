@@ -185,6 +185,10 @@ fn cases() -> Vec<(&'static str, Scenario, Trajectory)> {
         ("spline or taps", lens(set(camera(12.0), &taps(3, 1.6))), flying()),
         ("spline or taps, sharp", lens(set(camera(0.0), &taps(3, 1.6))), flying()),
         ("one tap, sharp", lens(set(camera(0.0), &taps(1, 2.5))), turning()),
+        ("area", set(camera(12.0), &scale(2.2)), turning()),
+        ("area, lens", lens(set(camera(12.0), &scale(1.8))), flying()),
+        ("area, sharp", set(camera(0.0), &scale(2.2)), flying()),
+        ("area, sharp, lens", lens(set(camera(0.0), &scale(1.8))), flying()),
         ("one tap", lens(set(camera(12.0), &taps(1, 2.5))), flying()),
         (
             "bottom to top, interlaced",
@@ -237,8 +241,5 @@ fn the_host_makes_the_same_picture() {
     let blurred = || keys.iter().filter(|key| key.blur && key.temporal == TemporalKind::Reproject);
     assert_all(&blurred().map(|key| key.depths).collect(), NodeDepths::ALL);
     assert_all(&blurred().map(|key| key.path).collect(), PathStage::ALL);
-    assert_all(
-        &keys.iter().map(|key| (key.blur, key.tap)).collect(),
-        [TapKind::Bilinear, TapKind::Spline, TapKind::Grid, TapKind::SplineOrGrid].into_iter().flat_map(|tap| [(false, tap), (true, tap)]),
-    );
+    assert_all(&keys.iter().map(|key| (key.blur, key.tap)).collect(), TapKind::ALL.into_iter().flat_map(|tap| [(false, tap), (true, tap)]));
 }

@@ -5,8 +5,8 @@ struct Footprint {
     // Ideal pixels per output pixel along x and y.
     dx: vec2<f32>,
     dy: vec2<f32>,
-    // Softness of the spline along x and y.
-    softness: vec2<f32>,
+    // Along x and y: softness of the spline, or sides of the area.
+    kernel: vec2<f32>,
     taps: vec2<u32>,
     // The order of the taps, if the tap slot has one.
     turns: vec2<u32>,

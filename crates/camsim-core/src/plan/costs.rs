@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     scene::Scene,
-    temporal::{Footprint, TapStage},
+    temporal::{Footprint, Kernel, TapStage},
 };
 
 /// Of an ideal pixel for each of the camera's: what any takes, each read of a surface's picture, what it takes more to read two of its smaller
@@ -37,6 +37,8 @@ const READ_MS: f64 = 0.24;
 const SPLINE_MS: f64 = 1.0;
 const GRID_MS: [f64; 2] = [1.2, 0.4];
 const EITHER_MS: [f64; 2] = [1.3, 0.8];
+/// Of reading an area of it, and of each two by two pixels that this may touch.
+const AREA_MS: [f64; 2] = [0.7, 0.22];
 /// Of reading it over an exposure, and for each sample.
 const SPLINE_SAMPLES_MS: [f64; 2] = [1.0, 0.75];
 const GRID_SAMPLES_MS: [f64; 2] = [1.5, 0.38];
@@ -153,17 +155,28 @@ fn footprint_ms(stage: TapStage, area: &Footprint, samples: Option<u32>) -> f64 
         return match stage {
             TapStage::Bilinear => READ_MS,
             TapStage::Spline => SPLINE_MS,
+            TapStage::Area => area_ms(area).map_or(EITHER_MS[0], |ms| AREA_MS[0] + ms),
             TapStage::Grid { .. } => GRID_MS[0] + GRID_MS[1] * (reads - 1.0),
-            TapStage::SplineOrGrid { .. } => EITHER_MS[0] + EITHER_MS[1] * if area.spline.is_some() { 0.0 } else { reads },
+            TapStage::SplineOrGrid { .. } => {
+                EITHER_MS[0] + EITHER_MS[1] * if matches!(area.kernel, Kernel::Spline(_)) { 0.0 } else { reads }
+            }
         };
     };
     let of = |[whole, each]: [f64; 2]| whole + each * samples;
     match stage {
         TapStage::Bilinear => READ_MS * samples,
         TapStage::Spline => of(SPLINE_SAMPLES_MS),
+        TapStage::Area => area_ms(area).map_or(of(EITHER_SAMPLES_MS), |ms| AREA_MS[0] + ms * samples),
         TapStage::Grid { .. } => of(GRID_SAMPLES_MS),
         TapStage::SplineOrGrid { .. } => of(EITHER_SAMPLES_MS),
     }
+}
+
+/// Of one read of an area, whatever others take; `None` of a spline.
+fn area_ms(area: &Footprint) -> Option<f64> {
+    let pairs = |side_px: f64| (0.5 * (side_px + 1.0)).ceil();
+    let Kernel::Area(sides_px) = area.kernel else { return None };
+    Some(AREA_MS[1] * pairs(sides_px.x) * pairs(sides_px.y))
 }
 
 #[cfg(test)]

@@ -151,6 +151,7 @@ impl FramePlan {
         let taps = match self.taps {
             TapStage::Bilinear => "bilinear".to_owned(),
             TapStage::Spline => "spline".to_owned(),
+            TapStage::Area => "spline, or mean over the pixel's area".to_owned(),
             TapStage::Grid { most } => format!("up to {most}x{most} taps a pixel"),
             TapStage::SplineOrGrid { most } => format!("spline, or up to {most}x{most} taps a pixel"),
         };

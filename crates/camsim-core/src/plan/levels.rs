@@ -321,6 +321,8 @@ impl Prospect<'_> {
             // Bilinear reads farther apart than a pixel leave less to be read, and for borders mostly do.
             None => {
                 let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
+                // Narrower ones are splines.
+                stages.extend(Some(TapStage::Area).filter(|_| scale * self.widths[1] > 2.0_f64.sqrt()));
                 stages.extend(CAPS.map(most_of));
                 stages.dedup();
                 stages

@@ -8,6 +8,7 @@
 //! | surface filter, some reads of a smaller version | mean over the reads, times what a version of 2^m texels has |
 //! | bilinear read between ideal pixels | `sinc^2(f_x) sinc^2(f_y)`, and as much of `f + k` for whole `k` |
 //! | spline | that of Catmull and Rom's kernel and of the B-spline, mixed by softness; the same aliases |
+//! | mean over an area of the sides `a` | `sinc(f_x) sinc(a_x f_x) sinc(f_y) sinc(a_y f_y)`; the same aliases |
 //! | grid of reads, samples on a path | `sin(pi n x) / (n sin(pi x))` of the step along each |
 //! | exact: mean over the pixel's sides and the path | `sinc` of each |
 
@@ -21,7 +22,7 @@ use std::f64::consts::PI;
 use glam::{DVec2, Vec4};
 
 use super::grain::mean_of;
-use crate::temporal::Footprint;
+use crate::temporal::{Footprint, Kernel};
 use lanes::{Frequencies4, Sampler};
 pub(super) use waves::{Waves, error2};
 
@@ -98,7 +99,8 @@ struct Alias {
     /// Whole cycles between the two, and what is left.
     away: i32,
     seen: f64,
-    /// What reads leave of it: a bilinear one, and the two kernels that a spline is mixed of.
+    /// What reads leave of it: a mean over a pixel, a bilinear one, and the two kernels that a spline is mixed of.
+    mean: f64,
     bilinear: f64,
     sharp: f64,
     soft: f64,
@@ -113,12 +115,17 @@ impl Alias {
     fn new(f: f64, step: i32) -> Self {
         let away = step - f.round() as i32;
         let seen = f + f64::from(away);
-        Self { away, seen, bilinear: sinc(seen).powi(2), sharp: catmull_rom(seen), soft: sinc(seen).powi(4) }
+        let mean = sinc(seen);
+        Self { away, seen, mean, bilinear: mean.powi(2), sharp: catmull_rom(seen), soft: mean.powi(4) }
     }
 
-    /// What a read leaves of it; softness as of [`Footprint::spline`].
-    fn read(&self, softness: Option<f64>) -> f64 {
-        softness.map_or(self.bilinear, |soft| self.sharp + soft * (self.soft - self.sharp))
+    /// What a read leaves of it along x (0) or y (1).
+    fn read(&self, kernel: Kernel, axis: usize) -> f64 {
+        match kernel {
+            Kernel::Bilinear => self.bilinear,
+            Kernel::Spline(softness) => self.sharp + softness[axis] * (self.soft - self.sharp),
+            Kernel::Area(sides_px) => self.mean * sinc(sides_px[axis] * self.seen),
+        }
     }
 }
 
@@ -143,9 +150,9 @@ impl Reads {
 
     /// Those of one wave, as far as they count; `turned` by where it is read, for so many whole cycles along x and y.
     fn add(&mut self, of: usize, [along_x, along_y]: &[[Alias; 3]; 2], area: &Footprint, turned: impl Fn([usize; 2]) -> Wave) {
-        let by_y = [0, 1, 2].map(|k: usize| along_y[k].read(area.spline.map(|softness| softness.y)));
+        let by_y = [0, 1, 2].map(|k: usize| along_y[k].read(area.kernel, 1));
         for (i, x) in along_x.iter().enumerate() {
-            let by_x = x.read(area.spline.map(|softness| softness.x));
+            let by_x = x.read(area.kernel, 0);
             for (k, y) in along_y.iter().enumerate() {
                 let by_both = by_x * by_y[k];
                 if by_both.abs() >= UNSEEN {
@@ -208,10 +215,10 @@ mod tests {
     use crate::temporal::ColorImage;
 
     /// A wave read between the pixels of a picture, over positions and phases: mean squared difference from `exact` times the wave itself.
-    fn measured(f: DVec2, softness: Option<f64>, at: DVec2, exact: f64) -> f64 {
+    fn measured(f: DVec2, kernel: Kernel, at: DVec2, exact: f64) -> f64 {
         let turns = 12;
         let size_px = [24, 24];
-        let area = Footprint { dx: DVec2::ZERO, dy: DVec2::ZERO, taps: [1, 1], spline: softness.map(DVec2::splat) };
+        let area = Footprint { dx: DVec2::ZERO, dy: DVec2::ZERO, taps: [1, 1], kernel };
         let wave = |px: DVec2, phase: f64| (2.0 * PI * f.dot(px) + phase).cos();
         let squares = (0..turns).map(|turn| {
             let phase = 2.0 * PI * f64::from(turn) / f64::from(turns);
@@ -225,21 +232,23 @@ mod tests {
 
     #[test]
     fn reads_between_pixels_leave_and_alias_what_their_transforms_say() {
-        for softness in [None, Some(0.0), Some(0.4)] {
+        let splines = [0.0, 0.4].map(|softness| Kernel::Spline(DVec2::splat(softness)));
+        let areas = [[1.0, 1.0], [1.3, 2.1], [3.0, 4.2]].map(|sides_px| Kernel::Area(sides_px.into()));
+        for kernel in [Kernel::Bilinear].into_iter().chain(splines).chain(areas) {
             for f in [DVec2::new(0.11, 0.05), DVec2::new(0.3, -0.2), DVec2::new(0.45, 0.4)] {
                 for at in [DVec2::ZERO, DVec2::new(0.5, 0.5), DVec2::new(0.2, 0.7)] {
                     let exact = 0.8;
                     let left: DVec2 = (-40..=40)
                         .flat_map(|x| (-40..=40).map(move |y| DVec2::new(f64::from(x), f64::from(y))))
                         .map(|away| {
-                            read(softness, (f + away).x) * read(softness, (f + away).y) * DVec2::from_angle(2.0 * PI * away.dot(at))
+                            read(kernel, 0, (f + away).x) * read(kernel, 1, (f + away).y) * DVec2::from_angle(2.0 * PI * away.dot(at))
                         })
                         .sum();
                     // The mean square of a real wave is half of its squared amplitude.
                     let expected = 0.5 * (left - DVec2::new(exact, 0.0)).length_squared();
-                    let found = measured(f, softness, at, exact);
+                    let found = measured(f, kernel, at, exact);
                     // Further aliases, and the four corners that the spline leaves out.
-                    assert!((found.sqrt() - expected.sqrt()).abs() < 0.01, "{softness:?} {f} {at}: {found:.5} {expected:.5}");
+                    assert!((found.sqrt() - expected.sqrt()).abs() < 0.01, "{kernel:?} {f} {at}: {found:.5} {expected:.5}");
                 }
             }
         }

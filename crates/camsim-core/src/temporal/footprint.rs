@@ -15,6 +15,8 @@ pub enum TapStage {
     Bilinear,
     /// One read of a cubic spline, as soft as the pixel is wide.
     Spline,
+    /// The mean over the pixel's area; the spline where a pixel is up to sqrt 2 ideal pixels wide.
+    Area,
     /// A grid of bilinear reads; one of them where a pixel is up to sqrt 3 ideal pixels wide.
     Grid {
         /// Reads along a side, at most.
@@ -31,6 +33,20 @@ pub enum TapStage {
 /// the ideal pixel and 2 of the tent.
 pub(crate) const TENT_PX2: f64 = 3.0;
 
+/// Widest area that is read, ideal pixels: six of them along each axis.
+pub const WIDEST_AREA_PX: f64 = 5.0;
+
+/// How ideal pixels around a source are weighed, along x and y.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kernel {
+    /// Between the four nearest.
+    Bilinear,
+    /// By a cubic spline of this softness.
+    Spline(DVec2),
+    /// By the part of a rectangle of these sides that each of them covers, ideal pixels, from 1 to [`WIDEST_AREA_PX`]. Of sides of 1 that is the bilinear one.
+    Area(DVec2),
+}
+
 /// Reads of an output pixel in the ideal frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
@@ -40,8 +56,8 @@ pub struct Footprint {
     pub dy: DVec2,
     /// Reads along each.
     pub taps: [u32; 2],
-    /// Softness of the one spline; `None` for bilinear reads.
-    pub spline: Option<DVec2>,
+    /// What each of them is.
+    pub kernel: Kernel,
 }
 
 impl Footprint {
@@ -50,17 +66,21 @@ impl Footprint {
     pub fn new(dx: DVec2, dy: DVec2, stage: TapStage) -> Self {
         let most = match stage {
             TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most.max(1),
-            TapStage::Bilinear | TapStage::Spline => 1,
+            TapStage::Bilinear | TapStage::Spline | TapStage::Area => 1,
         };
         let taps = [dx, dy].map(|side| match side.length_squared() > TENT_PX2 {
             true => ((side.length() - 0.1).ceil() as u32).clamp(1, most),
             false => 1,
         });
         let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
-        let has_spline = matches!(stage, TapStage::Spline | TapStage::SplineOrGrid { .. });
-        let spline = (has_spline && taps == [1, 1]).then(|| DVec2::new(softness(dx), softness(dy)));
+        let has_spline = matches!(stage, TapStage::Spline | TapStage::Area | TapStage::SplineOrGrid { .. });
+        let kernel = match stage {
+            TapStage::Area if sides_of_area(dx, dy) != DVec2::ONE => Kernel::Area(sides_of_area(dx, dy)),
+            _ if has_spline && taps == [1, 1] => Kernel::Spline(DVec2::new(softness(dx), softness(dy))),
+            _ => Kernel::Bilinear,
+        };
         let [dx, dy] = [(dx, taps[0]), (dy, taps[1])].map(|(side, taps)| spread(side, taps));
-        Self { dx, dy, taps, spline }
+        Self { dx, dy, taps, kernel }
     }
 
     /// Offset of tap `i` (cyclic) from the pixel's centre, ideal pixels.
@@ -82,11 +102,19 @@ impl Footprint {
     /// Colour of tap `i` around a source.
     #[must_use]
     pub fn tap_color(&self, color: &ColorImage<'_>, source_px: DVec2, i: u32) -> DVec3 {
-        match self.spline {
-            Some(softness) => color.spline(source_px, softness),
-            None => color.sample(source_px + self.offset_px(i)),
+        match self.kernel {
+            Kernel::Bilinear => color.sample(source_px + self.offset_px(i)),
+            Kernel::Spline(softness) => color.spline(source_px, softness),
+            Kernel::Area(sides_px) => color.over_area(source_px, sides_px),
         }
     }
+}
+
+/// Sides of the rectangle that is read of a pixel: along the frame's own axes, so that with the ideal pixels' own width its variance is the pixel's, which has the same along all axes
+/// if it is a square, however that is turned. What ideal pixels of several samples have themselves is not taken off besides, as it is of grids: borders come out sharper so, and nearer to
+/// what they are.
+fn sides_of_area(dx: DVec2, dy: DVec2) -> DVec2 {
+    (dx * dx + dy * dy - 1.0).clamp(DVec2::ONE, DVec2::splat(WIDEST_AREA_PX * WIDEST_AREA_PX)).map(f64::sqrt)
 }
 
 /// `n` reads evenly over a length d have the variance `d^2 (1 - 1/n^2) / 12`.
@@ -143,24 +171,52 @@ mod tests {
         // A parabola's mean over an area tells its variance.
         let size_px = [40, 40];
         let parabola = |i: u32| (f64::from(i % 40) - 20.0).powi(2) + 1.0 / 12.0;
-        let rgba: Vec<f32> = (0..1600).flat_map(|i| [parabola(i) as f32, 0.0, 0.0, 1.0]).collect();
+        let rgba: Vec<f32> = (0..1600).flat_map(|i| [parabola(i) as f32, (i % 40) as f32 - 20.0, 0.0, 1.0]).collect();
         let color = ColorImage { size_px, rgba: &rgba };
         let mean = |width_px: f64, stage: TapStage| {
             let area = Footprint::new(DVec2::new(width_px, 0.0), DVec2::Y, stage);
             let at = |k: u32| DVec2::new(20.0 + f64::from(k) / 16.0, 20.0);
-            // Over all positions between the pixels, less the parabola at the centre.
-            (0..16).map(|k| gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8).x - (at(k).x - 20.0).powi(2)).sum::<f64>() / 16.0
+            // Over all positions between the pixels, about each of them.
+            let about = |k: u32| {
+                let (found, x) = (gather(&[at(k)], PathStage::Straight, &area, &color, 2.0, 8), at(k).x - 20.0);
+                found.x - 2.0 * x * found.y + x * x
+            };
+            (0..16).map(about).sum::<f64>() / 16.0
         };
         for width_px in [1.0, 1.2, 1.5, 1.7, 2.0, 2.6, 3.4] {
             let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
             assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
         }
+        // An area has the pixel's variance and that of an ideal pixel, which this parabola has not.
+        for width_px in [1.5, 2.0, 2.6, 3.4, 5.0] {
+            let found = mean(width_px, TapStage::Area) - (width_px * width_px + 1.0) / 12.0;
+            assert!(found.abs() < 2e-3, "{width_px}: {found}");
+        }
+        assert_eq!(mean(1.4, TapStage::Area), mean(1.4, TapStage::Spline), "narrow ones are splines");
         // What one bilinear read is off by, and that a grid is the same where it has several.
         assert!((mean(1.0, TapStage::Bilinear) - 3.0 / 12.0).abs() < 2e-3);
         for [width_px, is_off_by] in [[1.0, 2.0 / 12.0], [1.7, (3.0 - 1.7 * 1.7) / 12.0], [2.0, 0.0], [3.4, 0.0]] {
             let found = mean(width_px, TapStage::Grid { most: 4 }) - width_px * width_px / 12.0;
             assert!((found - is_off_by).abs() < 2e-3, "{width_px}: {found} {is_off_by}");
         }
+    }
+
+    #[test]
+    fn areas_are_as_wide_however_a_square_pixel_is_turned_and_no_wider_than_is_read() {
+        let of = |turn: f64, width_px: f64| {
+            let across = width_px * DVec2::from_angle(turn);
+            Footprint::new(across, across.perp(), TapStage::Area).kernel
+        };
+        let Kernel::Area(sides_px) = of(0.0, 2.5) else { panic!("a wide pixel") };
+        assert!(sides_px.distance(DVec2::splat((2.5_f64 * 2.5 - 1.0).sqrt())) < 1e-12);
+        for turn in [0.1, 0.7, 2.0] {
+            let Kernel::Area(turned_px) = of(turn, 2.5) else { panic!("a wide pixel") };
+            assert!(turned_px.distance(sides_px) < 1e-12, "{turn}: {turned_px}");
+        }
+        assert_eq!(of(0.3, 9.0), Kernel::Area(DVec2::splat(WIDEST_AREA_PX)));
+        // Narrow along one axis alone.
+        let one = Footprint::new(3.0 * DVec2::X, DVec2::Y, TapStage::Area);
+        assert_eq!(one.kernel, Kernel::Area(DVec2::new(8.0_f64.sqrt(), 1.0)));
     }
 
     #[test]

@@ -87,7 +87,7 @@ pub fn serves(plan: &FramePlan) -> bool {
     let has_rows = plan.shutter.lines_axis() == LinesAxis::Rows;
     let has_few_taps = match plan.taps {
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most <= MOST_TAPS,
-        TapStage::Bilinear | TapStage::Spline => true,
+        TapStage::Bilinear | TapStage::Spline | TapStage::Area => true,
     };
     let has_sides = plan.ideal.size_px.iter().all(|&side| side >= 2);
     is_plain && solves && keeps_lens && has_rows && has_few_taps && has_sides

@@ -25,8 +25,14 @@ pub enum TemporalKind {
 pub enum TapKind {
     Bilinear,
     Spline,
+    Area,
     Grid,
     SplineOrGrid,
+}
+
+impl TapKind {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Bilinear, Self::Spline, Self::Area, Self::Grid, Self::SplineOrGrid];
 }
 
 impl From<TapStage> for TapKind {
@@ -34,6 +40,7 @@ impl From<TapStage> for TapKind {
         match stage {
             TapStage::Bilinear => Self::Bilinear,
             TapStage::Spline => Self::Spline,
+            TapStage::Area => Self::Area,
             TapStage::Grid { .. } => Self::Grid,
             TapStage::SplineOrGrid { .. } => Self::SplineOrGrid,
         }
@@ -209,7 +216,7 @@ impl PipelineKey {
                             .flat_map(|depths| PathStage::ALL.map(|path| (depths, path)))
                             .filter(|&(depths, path)| looks_up || depths == NodeDepths::Each && (blur || path == PathStage::Straight));
                         for (depths, path) in exposures {
-                            for tap in [TapKind::Bilinear, TapKind::Spline, TapKind::Grid, TapKind::SplineOrGrid] {
+                            for tap in TapKind::ALL {
                                 let truths: &[bool] = if key_kind == KeyKind::Elsewhere { &[true] } else { &[false, true] };
                                 let looks: &[Looks] = if parallax { &Looks::ALL } else { &[Looks::Several] };
                                 let stretches: &[Stretches] = if blur { &Stretches::ALL } else { &[Stretches::Several] };
@@ -296,6 +303,7 @@ impl PipelineKey {
         let tap = match self.tap {
             TapKind::Bilinear => "reverse/gather/tap/bilinear.wgsl",
             TapKind::Spline => "reverse/gather/tap/spline.wgsl",
+            TapKind::Area => "reverse/gather/tap/area.wgsl",
             TapKind::Grid => "reverse/gather/tap/grid.wgsl",
             TapKind::SplineOrGrid => "reverse/gather/tap/spline_or_grid.wgsl",
         };
@@ -408,6 +416,6 @@ mod tests {
             let mut validator = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), capabilities);
             validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
         }
-        assert_eq!(PipelineKey::all().len(), 15_056);
+        assert_eq!(PipelineKey::all().len(), 18_818);
     }
 }

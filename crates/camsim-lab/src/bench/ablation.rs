@@ -99,6 +99,8 @@ pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>,
 fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
     let taps = match plan.taps {
         TapStage::Bilinear | TapStage::Spline => 1,
+        // As many as the area has ideal pixels: no number asks for areas.
+        TapStage::Area => plan.ideal.scale(&plan.camera).ceil() as u32,
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
     };
     QualitySpec {

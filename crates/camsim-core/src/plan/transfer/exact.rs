@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec2;
 
 use super::{Over, Path, UNSEEN, Wave, catmull_rom, evenly, sinc, turned_by};
-use crate::temporal::Footprint;
+use crate::temporal::{Footprint, Kernel};
 
 /// What is left of a wave, read beside ideal pixels by so much.
 pub(super) fn read_wave(f: DVec2, area: &Footprint, over: Over, beside_px: DVec2) -> Wave {
@@ -29,12 +29,12 @@ pub(super) fn sampled(area: &Footprint, over: Over, f: DVec2) -> Wave {
     }
 }
 
-/// A read of the ideal frame along one axis; softness as of [`Footprint::spline`], `None` is bilinear.
-pub(super) fn read(softness: Option<f64>, f: f64) -> f64 {
-    match softness {
-        None => sinc(f).powi(2),
-        Some(soft) if soft > 0.0 => (1.0 - soft) * catmull_rom(f) + soft * sinc(f).powi(4),
-        Some(_) => catmull_rom(f),
+/// A read of the ideal frame along x (0) or y (1).
+pub(super) fn read(kernel: Kernel, axis: usize, f: f64) -> f64 {
+    match kernel {
+        Kernel::Bilinear => sinc(f).powi(2),
+        Kernel::Spline(softness) => (1.0 - softness[axis]) * catmull_rom(f) + softness[axis] * sinc(f).powi(4),
+        Kernel::Area(sides_px) => sinc(f) * sinc(sides_px[axis] * f),
     }
 }
 
@@ -46,11 +46,11 @@ struct Alias {
 }
 
 /// A wave along one axis and the slowest two that look like it.
-fn aliases(softness: Option<f64>, f: f64, beside_px: f64) -> [Alias; 3] {
+fn aliases(kernel: Kernel, axis: usize, f: f64, beside_px: f64) -> [Alias; 3] {
     [-1.0, 0.0, 1.0].map(|step: f64| {
         let away = step - f.round();
         let seen = f + away;
-        Alias { seen, read: read(softness, seen) * turned_by(away * beside_px) }
+        Alias { seen, read: read(kernel, axis, seen) * turned_by(away * beside_px) }
     })
 }
 
@@ -64,7 +64,7 @@ struct Read {
 
 /// The wave itself, and those that it looks like on the grid of ideal pixels, the slow ones foremost, as far as they count.
 fn reads_of(f: DVec2, area: &Footprint, beside_px: DVec2) -> impl Iterator<Item = Read> {
-    let [x, y] = [0, 1].map(|k| aliases(area.spline.map(|softness| softness[k]), f[k], beside_px[k]));
+    let [x, y] = [0, 1].map(|k| aliases(area.kernel, k, f[k], beside_px[k]));
     let both = (0..9).map(move |i| {
         let (x, y) = (&x[i / 3], &y[i % 3]);
         Read { f: DVec2::new(x.seen, y.seen), leaves: x.read.rotate(y.read) }

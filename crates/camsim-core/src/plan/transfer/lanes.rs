@@ -173,6 +173,7 @@ mod tests {
     use glam::DVec2;
 
     use super::{super::exact::sampled, *};
+    use crate::temporal::Kernel;
 
     #[test]
     fn the_short_sine_is_a_sine() {
@@ -189,7 +190,7 @@ mod tests {
         for (taps, samples) in
             [([4, 4], 7), ([4, 4], 16), ([4, 4], 41), ([3, 2], 5), ([2, 4], 64), ([7, 3], 30), ([1, 5], 3), ([3, 2], 48), ([64, 64], 9000)]
         {
-            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, spline: None };
+            let area = Footprint { dx: DVec2::new(3.1, 0.4), dy: DVec2::new(-0.2, 2.7), taps, kernel: Kernel::Bilinear };
             let over = Over::Samples(Path { along: DVec2::new(5.3, -2.1), samples });
             for f in [DVec2::new(0.11, 0.05), DVec2::new(-0.7, 0.3), DVec2::new(1.4, 0.9), DVec2::ZERO] {
                 let found = Sampler::new(&area, over).leaves(Frequencies4 { x: Vec4::splat(f.x as f32), y: Vec4::splat(f.y as f32) });

@@ -120,7 +120,7 @@ mod tests {
     fn four_waves_at_a_time_are_as_one_by_one() {
         let waves = Waves::new(&Spectrum::flat(-2.0), DMat2::from_diagonal(DVec2::splat(3.5)), DMat2::IDENTITY, None);
         assert_eq!(waves.0.len(), TABLE.len(), "all are seen");
-        let stages = [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 3 }, TapStage::SplineOrGrid { most: 7 }];
+        let stages = [TapStage::Bilinear, TapStage::Spline, TapStage::Area, TapStage::Grid { most: 3 }, TapStage::SplineOrGrid { most: 7 }];
         for (stage, scale) in stages.into_iter().flat_map(|stage| [0.9, 1.3, 2.9, 6.1].map(|scale| (stage, scale))) {
             let area = Footprint::new(scale * DVec2::new(1.0, 0.2), scale * DVec2::new(-0.1, 0.8), stage);
             let along = DVec2::new(31.3, -17.9);

@@ -1,6 +1,6 @@
 //! Area of a pixel in the ideal frame and what reads it: twin of shaders/reverse/gather/footprint.wgsl and its taps.
 
-use camsim_core::temporal::tap_shares;
+use camsim_core::temporal::{WIDEST_AREA_PX, tap_shares};
 
 use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole, within};
 use crate::reverse::TapKind;
@@ -34,8 +34,10 @@ impl Cells {
 pub(super) struct Footprint<'a> {
     /// Grids of reads, if there are any.
     grid: Option<Grid<'a>>,
-    /// How soft the spline is that reads pixels of one read, if one does.
+    /// How soft the spline is that reads narrow pixels, if one does.
     pub softness: Option<Lanes2>,
+    /// Sides of the areas that are read of wide ones, if they are; 1 of narrow ones.
+    pub area: Option<Lanes2>,
 }
 
 struct Grid<'a> {
@@ -54,13 +56,20 @@ impl<'a> Footprint<'a> {
     #[inline(always)]
     pub fn new(cells: &'a Cells, tap: TapKind, sides: impl FnOnce() -> [Lanes2; 2], most: u32) -> Self {
         if tap == TapKind::Bilinear {
-            return Self { grid: None, softness: None };
+            return Self { grid: None, softness: None, area: None };
         }
         let sides = sides();
         // Written out: what `then` calls may be compiled without the vectors that this is.
-        let softness = if matches!(tap, TapKind::Spline | TapKind::SplineOrGrid) { Some(softness(&sides)) } else { None };
+        let softness = if matches!(tap, TapKind::Spline | TapKind::Area | TapKind::SplineOrGrid) { Some(softness(&sides)) } else { None };
         let grid = if matches!(tap, TapKind::Grid | TapKind::SplineOrGrid) { Some(Grid::new(cells, &sides, most)) } else { None };
-        Self { grid, softness }
+        let area = if tap == TapKind::Area { Some(area(&sides)) } else { None };
+        Self { grid, softness, area }
+    }
+
+    /// Whether something else than the spline reads a pixel.
+    #[inline(always)]
+    pub fn is_wide(&self, i: usize) -> bool {
+        self.area.as_ref().map_or_else(|| self.reads(i) > 1.0, |sides| (sides.x[i] > 1.0) | (sides.y[i] > 1.0))
     }
 
     /// Reads of a pixel that see all of it.
@@ -132,6 +141,17 @@ fn spread(side: &Lanes2, most: f32) -> (Lanes2, Lanes) {
 fn softness(sides: &[Lanes2; 2]) -> Lanes2 {
     let along = |side: &Lanes2| each(|i| within(0.25 * (side.x[i] * side.x[i] + side.y[i] * side.y[i] - 1.0), 1.0));
     Lanes2 { x: along(&sides[0]), y: along(&sides[1]) }
+}
+
+/// Sides of the area of each pixel along the frame's axes: its variance, but for an ideal pixel's own.
+#[inline(always)]
+fn area(sides: &[Lanes2; 2]) -> Lanes2 {
+    const WIDEST: f32 = WIDEST_AREA_PX as f32;
+    let [across, down] = sides;
+    let along = |of: &Lanes, other: &Lanes| {
+        each(|i| lower(higher(of[i].mul_add(of[i], other[i].mul_add(other[i], -1.0)), 1.0), WIDEST * WIDEST).sqrt())
+    };
+    Lanes2 { x: along(&across.x, &down.x), y: along(&across.y, &down.y) }
 }
 
 /// A cubic spline over the texels around places: four by four without the corners.

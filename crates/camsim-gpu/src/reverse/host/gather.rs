@@ -8,7 +8,7 @@ use super::{
     ideal::Halves,
     source::{Nodes, Pose, Source},
 };
-use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each};
+use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, whether};
 use crate::host::vectors::Vectors;
 
 /// What pixels collect.
@@ -199,11 +199,17 @@ impl Reads<'_> {
         let Some(softness) = &area.softness else {
             return self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum);
         };
-        let is_wide = |i: usize| area.reads(i) > 1.0;
-        if (0..LANES).any(is_wide) {
-            self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), |i| is_taken(i) && is_wide(i), |_| 1.0, sum);
+        let wide = whether(|i| area.is_wide(i));
+        if wide.contains(&1.0) {
+            let is_taken = |i: usize| is_taken(i) && wide[i] > 0.0;
+            match &area.area {
+                Some(sides_px) => self.ideal.add_area(vectors, self.frame, at_px, sides_px, is_taken, sum),
+                None => self.ideal.add_color(vectors, self.frame, &area.moved(at_px, tap), is_taken, |_| 1.0, sum),
+            }
         }
-        let spline = Spline::around(at_px, softness);
-        self.ideal.add_spline(vectors, self.frame, &spline, |i| is_taken(i) && !is_wide(i), sum);
+        if wide.contains(&0.0) {
+            let spline = Spline::around(at_px, softness);
+            self.ideal.add_spline(vectors, self.frame, &spline, |i| is_taken(i) && wide[i] == 0.0, sum);
+        }
     }
 }

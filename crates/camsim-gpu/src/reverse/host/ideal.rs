@@ -96,6 +96,94 @@ impl IdealOnHost<'_> {
         }
     }
 
+    /// Adds means of linear colour over areas with these sides for each pixel that takes one.
+    #[inline(always)]
+    pub(super) fn add_area(
+        &self,
+        vectors: impl Vectors,
+        frame: &FrameUniforms,
+        at_px: &Lanes2,
+        sides_px: &Lanes2,
+        is_taken: impl Fn(usize) -> bool,
+        sum: &mut [Halves; LANES],
+    ) {
+        let texels = |sides: &Lanes| whole(sides.iter().fold(0.0, |most: f32, &side| higher(most, side + 1.0)).ceil());
+        match [texels(&sides_px.x), texels(&sides_px.y)] {
+            [0..=2, 0..=2] => self.add_areas::<2, 2>(vectors, frame, at_px, sides_px, is_taken, sum),
+            [0..=4, 0..=3] => self.add_areas::<4, 3>(vectors, frame, at_px, sides_px, is_taken, sum),
+            [0..=4, 0..=4] => self.add_areas::<4, 4>(vectors, frame, at_px, sides_px, is_taken, sum),
+            [0..=6, 0..=5] => self.add_areas::<6, 5>(vectors, frame, at_px, sides_px, is_taken, sum),
+            _ => self.add_areas::<6, 6>(vectors, frame, at_px, sides_px, is_taken, sum),
+        }
+    }
+
+    /// The same of areas that touch so many texels along x, two by two, and y, at most.
+    #[inline(always)]
+    fn add_areas<const COLUMNS: usize, const ROWS: usize>(
+        &self,
+        vectors: impl Vectors,
+        frame: &FrameUniforms,
+        at_px: &Lanes2,
+        sides_px: &Lanes2,
+        is_taken: impl Fn(usize) -> bool,
+        sum: &mut [Halves; LANES],
+    ) {
+        let (columns, rows) = (Span::<COLUMNS>::new(&at_px.x, &sides_px.x), Span::<ROWS>::new(&at_px.y, &sides_px.y));
+        let share = each(|i| 1.0 / (sides_px.x[i] * sides_px.y[i]));
+        let [right, bottom] = [(0, COLUMNS), (1, ROWS)].map(|(k, texels)| frame.ideal_size_px[k] as f32 - texels as f32);
+        let mut is_within = true;
+        for i in 0..LANES {
+            let is_inside = (columns.first[i] >= 0.0) & (columns.first[i] <= right) & (rows.first[i] >= 0.0) & (rows.first[i] <= bottom);
+            is_within &= !is_taken(i) | is_inside;
+        }
+        if !is_within {
+            return self.add_pairs(vectors, frame, &columns, &rows, &share, is_taken, sum);
+        }
+        let stride = CHANNELS * self.color_stride as usize;
+        for i in 0..LANES {
+            if !is_taken(i) {
+                continue;
+            }
+            let first = whole(rows.first[i]) as usize * stride + CHANNELS * whole(columns.first[i]) as usize;
+            let Some(texels) = self.color.get(first..first + (ROWS - 1) * stride + COLUMNS * CHANNELS) else { continue };
+            for pair in 0..COLUMNS / 2 {
+                let mut of_pair = [0.0; 2 * CHANNELS];
+                for row in 0..ROWS {
+                    let numbers = vectors.numbers(pair_at(texels, row * stride + 2 * CHANNELS * pair));
+                    for k in 0..2 * CHANNELS {
+                        of_pair[k] = rows.weights[row][i].mul_add(numbers[k], of_pair[k]);
+                    }
+                }
+                for k in 0..2 * CHANNELS {
+                    // Left texels come first.
+                    let weight = share[i] * if k < CHANNELS { columns.weights[2 * pair][i] } else { columns.weights[2 * pair + 1][i] };
+                    sum[i][k] = weight.mul_add(of_pair[k], sum[i][k]);
+                }
+            }
+        }
+    }
+
+    /// The same where some lie beyond the frame, whose texels there are those of its border: by reads between two by two, which see to that.
+    #[inline(never)]
+    fn add_pairs<const COLUMNS: usize, const ROWS: usize>(
+        &self,
+        vectors: impl Vectors,
+        frame: &FrameUniforms,
+        columns: &Span<COLUMNS>,
+        rows: &Span<ROWS>,
+        share: &Lanes,
+        is_taken: impl Fn(usize) -> bool,
+        sum: &mut [Halves; LANES],
+    ) {
+        for row in (0..ROWS).step_by(2) {
+            let [y, of_row] = rows.between(row);
+            for column in (0..COLUMNS).step_by(2) {
+                let [x, of_column] = columns.between(column);
+                self.add_color(vectors, frame, &Lanes2 { x, y }, &is_taken, |i| share[i] * of_row[i] * of_column[i], sum);
+            }
+        }
+    }
+
     /// Adds splines of linear colour for each pixel that takes one.
     #[inline(always)]
     pub(super) fn add_spline(
@@ -143,6 +231,34 @@ impl IdealOnHost<'_> {
     }
 }
 
+/// Rows or columns of texels that an area touches: the first one, and how much of each is covered.
+struct Span<const TEXELS: usize> {
+    first: Lanes,
+    weights: [Lanes; TEXELS],
+}
+
+impl<const TEXELS: usize> Span<TEXELS> {
+    #[inline(always)]
+    fn new(at_px: &Lanes, side_px: &Lanes) -> Self {
+        let reach = each(|i| 0.5 * (side_px[i] + 1.0));
+        let first = each(|i| (at_px[i] - reach[i]).floor() + 1.0);
+        let mut weights = [ZERO; TEXELS];
+        for (k, weights) in weights.iter_mut().enumerate() {
+            for i in 0..LANES {
+                weights[i] = within(reach[i] - (first[i] + k as f32 - at_px[i]).abs(), 1.0);
+            }
+        }
+        Self { first, weights }
+    }
+
+    /// Where a read between a texel and the next one stands for both, and how much of them is covered.
+    fn between(&self, texel: usize) -> [Lanes; 2] {
+        let second = self.weights.get(texel + 1).unwrap_or(&ZERO);
+        let both = each(|i| self.weights[texel][i] + second[i]);
+        [each(|i| self.first[i] + texel as f32 + second[i] / higher(both[i], f32::MIN_POSITIVE)), both]
+    }
+}
+
 /// Two texels.
 #[inline(always)]
 fn pair_at(values: &[u16], at: usize) -> [u16; 2 * CHANNELS] {
@@ -159,6 +275,8 @@ fn ends<T: Copy + Default, const N: usize>(values: &[T], at: usize, span: usize)
 #[cfg(test)]
 mod tests {
     use bytemuck::Zeroable;
+    use camsim_core::temporal::ColorImage;
+    use glam::{DVec2, DVec3};
 
     use super::*;
     use crate::host::vectors::widest;
@@ -206,5 +324,39 @@ mod tests {
             (within, beside) = if is_within { (within + 1, beside) } else { (within, beside + 1) };
         }
         assert!(within >= 200 && beside >= 100, "{within} {beside}");
+    }
+
+    #[test]
+    fn areas_have_the_means_of_their_twin_within_the_frame_and_beyond_it() {
+        let (width, height, stride) = (70, 45, 75);
+        let number = |i: usize| half::f16::from_f32((i as f32 * 0.618_034).fract());
+        let color: Vec<u16> = (0..CHANNELS * stride * height).map(|i| number(i).to_bits()).collect();
+        let ideal = IdealOnHost { color: &color, color_stride: stride as u32, depth: &[], depth_stride: 0 };
+        let frame = FrameUniforms { ideal_size_px: [width, height as u32], ..Zeroable::zeroed() };
+        let of_row = |y: usize| (CHANNELS * stride * y..CHANNELS * (stride * y + width as usize)).map(|i| number(i).to_f32());
+        let rgba: Vec<f32> = (0..height).flat_map(of_row).collect();
+        let twin = ColorImage { size_px: frame.ideal_size_px, rgba: &rgba };
+        let part = |i: usize, step: f32| (i as f32 * step).fract();
+        // From one to six texels along each axis; pixels of a block alike, or each with sides of its own.
+        for (block, most) in (0..600).flat_map(|block| [1.0, 1.9, 2.9, 3.9, 5.0].map(|most| (block, most))) {
+            let place = |i: usize| block * LANES + i;
+            let is_within = block % 3 != 0;
+            let at = |i: usize, step: f32, size: f32| {
+                if is_within { 4.0 + (size - 9.0) * part(place(i), step) } else { -6.0 + (size + 12.0) * part(place(i), step) }
+            };
+            let at_px = Lanes2 { x: each(|i| at(i, 0.754_878, 70.0)), y: each(|i| at(i, 0.569_84, 45.0)) };
+            let side = |i: usize, step: f32| 1.0 + (most - 1.0) * if block % 2 == 0 { part(block, step) } else { part(place(i), step) };
+            let sides_px = Lanes2 { x: each(|i| side(i, 0.324_718)), y: each(|i| side(i, 0.220_744)) };
+            let is_taken = |i: usize| !(block + i).is_multiple_of(7);
+            let mut found = [[0.0; 8]; LANES];
+            widest!(vectors => ideal.add_area(vectors, &frame, &at_px, &sides_px, is_taken, &mut found));
+            for i in 0..LANES {
+                let [at, sides] = [&at_px, &sides_px].map(|of| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i])));
+                let exact = if is_taken(i) { twin.over_area(at, sides) } else { DVec3::ZERO };
+                let found = DVec3::from_array([0, 1, 2].map(|k: usize| f64::from(found[i][k] + found[i][k + CHANNELS])));
+                // Places are known to the last bit of 70, and weights by as much.
+                assert!(found.distance(exact) < 2e-5, "{block} {i}, {at}, {sides}: {found} {exact}");
+            }
+        }
     }
 }
