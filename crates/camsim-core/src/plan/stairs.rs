@@ -28,8 +28,10 @@ const LOWEST: f64 = 0.031_25;
 const OCTAVES: f64 = 9.0;
 /// Waves that stand for all: of 252 ways to read borders whose pixels have one sample their RMS is 0.96 to 1.10 times that of 30 000 waves, 2 % off in the RMS.
 const WAVES: u32 = 288;
-/// Means over areas leave so little that each wave that is not looked at is more: of wide ones with four samples a pixel 288 told 0.56 to 0.92 times what is measured, these 0.9 to 1.14 times.
+/// Means over areas leave so little that each wave that is not looked at is more: of wide ones with four samples a pixel 288 told 0.56 to 0.92 times what is measured, these 0.94 to 1.19 times.
 const WAVES_OF_AREAS: u32 = 1152;
+/// And what looks like a wave from farther away than is counted (`transfer.rs`) is a tenth of that little: without it 0.94 to 0.96 times what is measured is told of borders that do not move.
+const FARTHER_OF_AREAS: f64 = 1.1;
 /// From one wave to the next, as parts of the range: direction, and where the source lies between ideal pixels.
 const STEP_OF_WAVES: [f64; 3] = [0.618_033_988_749_895, 0.754_877_666_246_693, 0.569_840_290_998_053];
 /// Direction of the path for the first wave, a quarter of a turn further for each next one: each cell of a grid is read at an instant of its own, so that its
@@ -211,8 +213,11 @@ fn worked_out(width_px: f64, area: &Footprint, exposure: Option<(f64, u32)>) -> 
             sum + weight * DVec2::new(off2(1.0), off2(left_by_samples))
         })
     };
-    let table = if matches!(area.kernel, Kernel::Area(_)) { &TABLE_OF_AREAS } else { &TABLE };
-    let squares: DVec2 = (0..).zip(table.iter()).map(of_direction).sum();
+    let (table, farther) = match area.kernel {
+        Kernel::Area(_) => (&TABLE_OF_AREAS, FARTHER_OF_AREAS),
+        Kernel::Bilinear | Kernel::Spline(_) => (&TABLE, 1.0),
+    };
+    let squares: DVec2 = (0..).zip(table.iter()).map(of_direction).sum::<DVec2>() * farther;
     // A border of a length in output pixels is as many times longer in ideal pixels as those are smaller, their area by the square of it.
     (squares / width_px).to_array()
 }
