@@ -2,11 +2,11 @@
 #import reverse/gather/interface.wgsl
 
 struct Footprint {
-    // Ideal pixels per output pixel along x and y.
+    // Ideal pixels per output pixel along x and y, less what reads have themselves; of areas `dx` has the sides.
     dx: vec2<f32>,
     dy: vec2<f32>,
-    // Along x and y: softness of the spline, or sides of the area.
-    kernel: vec2<f32>,
+    // Softness of the spline along x and y.
+    softness: vec2<f32>,
     taps: vec2<u32>,
     // The order of the taps, if the tap slot has one.
     turns: vec2<u32>,

@@ -374,7 +374,7 @@ pub(super) mod tests {
         assert_eq!(with_rays(2.0, 1), with_rays(1.0, 2));
         // What nothing can leave less of lets nobody think that more would be left.
         for (scale, samples_a_pixel) in [1.0, 1.41, 2.0, 2.83, 4.0, 5.0].into_iter().flat_map(|scale| [(scale, 1), (scale, 4)]) {
-            for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Grid { most: 5 }] {
+            for taps in [TapStage::Bilinear, TapStage::Spline, TapStage::Area, TapStage::Grid { most: 5 }] {
                 let plain = still.plain(&Sampling { taps, samples_a_pixel, ..read_at(scale) }, None);
                 let at_best = still.plain_at_best(scale, samples_a_pixel > 1);
                 assert!(at_best.error_dn < plain.error_dn, "{scale} {samples_a_pixel} {taps:?}");

@@ -18,7 +18,7 @@ use super::{
 use crate::{
     scenario::{Auto, Preset, QualitySpec},
     scene::Scene,
-    temporal::{Footprint, SAMPLES, TENT_PX2, TapStage, samples_for},
+    temporal::{Footprint, SAMPLES, TENT_PX2, TapStage, WIDEST_AREA_PX, samples_for},
 };
 
 /// One place in so many is asked first, and so far above the tolerance these then settle it.
@@ -51,6 +51,8 @@ const ROUNDED: f64 = 1.0 + 1e-9;
 const MAX_SAMPLES: u32 = 512;
 /// Most reads along a side of a pixel, unless `quality.footprint_taps` says otherwise.
 const MOST_TAPS: u32 = 5;
+/// How far pixels may be from rectangles along the axes that are read by such: what is told of borders is of squares. Of pixels 1.2 times as long along a diagonal as across it 1.07 times as much is left.
+const MOST_LEAN: f64 = 0.2;
 /// Those that are tried.
 const CAPS: [u32; 4] = [2, 3, 4, MOST_TAPS];
 /// Where no way keeps a tolerance: times the least error there is.
@@ -321,10 +323,12 @@ impl Prospect<'_> {
             // Bilinear reads farther apart than a pixel leave less to be read, and for borders mostly do.
             None => {
                 let mut stages = vec![TapStage::Bilinear, TapStage::Spline];
-                // Narrower ones are splines.
-                stages.extend(Some(TapStage::Area).filter(|_| scale * self.widths[1] > 2.0_f64.sqrt()));
                 stages.extend(CAPS.map(most_of));
                 stages.dedup();
+                // Narrower ones are splines, and of wider or slanted ones areas along the axes are not what they cover.
+                let width = scale * self.widths[1];
+                let fits = width > 2.0_f64.sqrt() && width <= WIDEST_AREA_PX && self.lean <= MOST_LEAN;
+                stages.extend(Some(TapStage::Area).filter(|_| fits));
                 stages
             }
         }

@@ -48,6 +48,8 @@ pub(super) struct Prospect<'a> {
     pub principal_px: DVec2,
     /// Narrowest and widest output pixel, camera px.
     pub widths: [f64; 2],
+    /// By how much the most slanted pixel's sides go together along x and y, as [`lean`] has it.
+    pub lean: f64,
     /// Whether the lens bends rows, and what the scene takes to draw.
     pub is_bent: bool,
     pub drawn: Drawn,
@@ -96,14 +98,22 @@ impl<'a> Prospect<'a> {
         let seen: Vec<Seen<'_>> = probes.par_iter().step_by(PROBE_STEP).map(sight).collect();
         let counted = seen.iter().filter(|seen| !matches!(seen, Seen::Several)).count();
         let sights = seen.into_iter().filter_map(|seen| if let Seen::Surface(sight) = seen { Some(sight) } else { None }).collect();
-        let width = |probe: &Probe| {
-            let sides = DMat2::from_diagonal(focal_px) * probe.uv_from_px;
-            sides.x_axis.length().max(sides.y_axis.length())
-        };
-        let widths = probes.iter().map(width).fold([f64::INFINITY, 0.0], |[least, most], width| [width.min(least), width.max(most)]);
+        let sides = |probe: &Probe| DMat2::from_diagonal(focal_px) * probe.uv_from_px;
+        let width = |sides: DMat2| sides.x_axis.length().max(sides.y_axis.length());
+        let lean = probes.iter().map(|probe| lean(sides(probe))).fold(0.0, f64::max);
+        let widths = probes
+            .iter()
+            .map(|probe| width(sides(probe)))
+            .fold([f64::INFINITY, 0.0], |[least, most], width| [width.min(least), width.max(most)]);
         let (is_bent, drawn) = (!reach.camera.lens.is_identity(), Drawn::new(&sequence.scene));
-        Self { sights: few_of(sights), is_bent, drawn, counted, principal_px: reach.camera.principal_point_px, widths }
+        Self { sights: few_of(sights), is_bent, drawn, counted, principal_px: reach.camera.principal_point_px, widths, lean }
     }
+}
+
+/// How far the parallelogram with these sides is from one that is as wide along x whatever its y: 0 of a square however it is turned and of a rectangle along the axes, 1 of a line across both.
+fn lean(sides: DMat2) -> f64 {
+    let variance = sides * sides.transpose();
+    variance.x_axis.y.abs() / (variance.x_axis.x * variance.y_axis.y).sqrt().max(f64::MIN_POSITIVE)
 }
 
 /// What a probe sees.

@@ -36,6 +36,9 @@ pub(crate) const TENT_PX2: f64 = 3.0;
 /// Widest area that is read, ideal pixels: six of them along each axis.
 pub const WIDEST_AREA_PX: f64 = 5.0;
 
+/// Areas of no longer sides are not read: a little more than 1, so that rounding decides nothing.
+const NARROW_AREA_PX: f64 = 1.000_05;
+
 /// How ideal pixels around a source are weighed, along x and y.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kernel {
@@ -75,7 +78,7 @@ impl Footprint {
         let softness = |side: DVec2| (0.25 * (side.length_squared() - 1.0)).clamp(0.0, 1.0);
         let has_spline = matches!(stage, TapStage::Spline | TapStage::Area | TapStage::SplineOrGrid { .. });
         let kernel = match stage {
-            TapStage::Area if sides_of_area(dx, dy) != DVec2::ONE => Kernel::Area(sides_of_area(dx, dy)),
+            TapStage::Area if sides_of_area(dx, dy).max_element() > NARROW_AREA_PX => Kernel::Area(sides_of_area(dx, dy)),
             _ if has_spline && taps == [1, 1] => Kernel::Spline(DVec2::new(softness(dx), softness(dy))),
             _ => Kernel::Bilinear,
         };
@@ -187,7 +190,7 @@ mod tests {
             let found = mean(width_px, TapStage::SplineOrGrid { most: 4 });
             assert!((found - width_px * width_px / 12.0).abs() < 2e-3, "{width_px}: {found} {}", width_px * width_px / 12.0);
         }
-        // An area has the pixel's variance and that of an ideal pixel, which this parabola has not.
+        // An area has the pixel's own variance with the ideal pixels' squares; what they are the mean of is not taken off.
         for width_px in [1.5, 2.0, 2.6, 3.4, 5.0] {
             let found = mean(width_px, TapStage::Area) - (width_px * width_px + 1.0) / 12.0;
             assert!(found.abs() < 2e-3, "{width_px}: {found}");

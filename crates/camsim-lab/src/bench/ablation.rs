@@ -95,12 +95,12 @@ pub fn without(sequence: &Sequence, effects: &[Effect]) -> Result<Arc<Sequence>,
     Ok(Arc::new(sequence))
 }
 
-/// The sampling of a plan, whatever it leaves of a picture; each frame from an ideal frame of its own.
+/// The sampling of a plan, or with grids where it reads areas, whatever it leaves of a picture; each frame from an ideal frame of its own.
 fn sampled_as(plan: &FramePlan, quality: &QualitySpec) -> QualitySpec {
     let taps = match plan.taps {
         TapStage::Bilinear | TapStage::Spline => 1,
-        // As many as the area has ideal pixels: no number asks for areas.
-        TapStage::Area => plan.ideal.scale(&plan.camera).ceil() as u32,
+        // No number asks for areas: a grid of as many reads as they have ideal pixels comes nearest to them.
+        TapStage::Area => (plan.ideal.scale(&plan.camera).ceil() as u32).max(2),
         TapStage::Grid { most } | TapStage::SplineOrGrid { most } => most,
     };
     QualitySpec {

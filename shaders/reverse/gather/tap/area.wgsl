@@ -4,6 +4,8 @@
 // Sides that are read, squared: areas that are narrower are splines, of wider ones the middle is read.
 const NARROWEST_PX2: f32 = 1.0;
 const WIDEST_PX2: f32 = 25.0;
+// A little more than the narrowest, so that rounding decides nothing.
+const NARROW_PX: f32 = 1.00005;
 
 // Sides of the area in place of the grid's.
 fn footprint(ray: Ray) -> Footprint {
@@ -15,11 +17,11 @@ fn footprint(ray: Ray) -> Footprint {
 }
 
 fn is_narrow(area: Footprint) -> bool {
-    return all(area.dx == vec2<f32>(1.0));
+    return all(area.dx <= vec2<f32>(NARROW_PX));
 }
 
 fn pairs_of(area: Footprint) -> vec2<f32> {
-    return ceil(0.5 * (area.dx + 1.0));
+    return min(ceil(0.5 * (area.dx + 1.0) - 1e-5), vec2<f32>(3.0));
 }
 
 fn reads_of_sample(area: Footprint) -> u32 {
@@ -41,18 +43,21 @@ fn area_read(area: Footprint, source_px: vec2<f32>, read: u32) -> WeighedRead {
     let pairs = pairs_of(area);
     let row = floor((f32(read) + 0.5) / pairs.x);
     let reach = 0.5 * (area.dx + 1.0);
-    let first_px = floor(source_px - reach) + 1.0 + 2.0 * vec2<f32>(f32(read) - pairs.x * row, row);
-    let first = saturate(reach - abs(first_px - source_px));
-    let second = saturate(reach - abs(first_px + 1.0 - source_px));
+    // From the place within its texel on, which is known to the last bit however far from the first one that is.
+    let base_px = floor(source_px);
+    let within_px = source_px - base_px;
+    let begin_px = floor(within_px - reach) + 1.0 + 2.0 * vec2<f32>(f32(read) - pairs.x * row, row);
+    let first = saturate(reach - abs(begin_px - within_px));
+    let second = saturate(reach - abs(begin_px + 1.0 - within_px));
     let both = first + second;
     // Where neither has any the read counts for nothing.
-    return WeighedRead(first_px + second / max(both, vec2<f32>(1e-9)), both.x * both.y / (area.dx.x * area.dx.y));
+    return WeighedRead(base_px + begin_px + second / max(both, vec2<f32>(1e-9)), both.x * both.y / (area.dx.x * area.dx.y));
 }
 
 fn tap_color(area: Footprint, source_px: vec2<f32>, tap: u32, read: u32) -> vec4<f32> {
     let of_sample = read - reads_of_sample(area) * sample_of(area, read);
     let of_area = area_read(area, source_px, of_sample);
-    let of_spline = spline_read(spline_around(source_px, area.kernel), of_sample);
+    let of_spline = spline_read(spline_around(source_px, area.softness), of_sample);
     let at_px = select(of_area.at_px, of_spline.at_px, is_narrow(area));
     return select(of_area.weight, of_spline.weight, is_narrow(area)) * ideal_color_at(at_px);
 }

@@ -6,5 +6,5 @@ fn footprint(ray: Ray) -> Footprint {
 }
 
 fn tap_color(area: Footprint, source_px: vec2<f32>, tap: u32, read: u32) -> vec4<f32> {
-    return ideal_color_by_spline(source_px, area.kernel);
+    return ideal_color_by_spline(source_px, area.softness);
 }

@@ -20,7 +20,7 @@ fn sample_of(area: Footprint, read: u32) -> u32 {
 }
 
 fn tap_color(area: Footprint, source_px: vec2<f32>, tap: u32, read: u32) -> vec4<f32> {
-    let of_spline = spline_read(spline_around(source_px, area.kernel), read - SPLINE_READS * sample_of(area, read));
+    let of_spline = spline_read(spline_around(source_px, area.softness), read - SPLINE_READS * sample_of(area, read));
     let at_px = select(source_px + cell_px(area, tap), of_spline.at_px, is_narrow(area));
     return select(1.0, of_spline.weight, is_narrow(area)) * ideal_color_at(at_px);
 }

@@ -7,6 +7,8 @@ use crate::reverse::TapKind;
 
 /// Reads along a side at most: of each grid up to that the order of reads is written down.
 pub(super) const MOST_TAPS: u32 = 8;
+/// As in camsim_core::temporal::footprint.
+const NARROW_AREA_PX: f32 = 1.000_05;
 /// A bilinear read has itself the variance of a pixel this wide.
 const WIDEST_SPLINE_PX: f32 = 1.732_050_8;
 
@@ -69,7 +71,7 @@ impl<'a> Footprint<'a> {
     /// Whether something else than the spline reads a pixel.
     #[inline(always)]
     pub fn is_wide(&self, i: usize) -> bool {
-        self.area.as_ref().map_or_else(|| self.reads(i) > 1.0, |sides| (sides.x[i] > 1.0) | (sides.y[i] > 1.0))
+        self.area.as_ref().map_or_else(|| self.reads(i) > 1.0, |sides| (sides.x[i] > NARROW_AREA_PX) | (sides.y[i] > NARROW_AREA_PX))
     }
 
     /// Reads of a pixel that see all of it.
@@ -257,5 +259,38 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn areas_and_splines_are_their_twins() {
+        use camsim_core::temporal::{Footprint as Twin, Kernel, TapStage};
+        use glam::DVec2;
+        let cells = Cells::new();
+        let (mut splines, mut areas) = (0, 0);
+        for block in 0..100 {
+            // Narrow and wide ones in a block, on both sides of the width that tells them apart, turned and mirrored.
+            let width = |i: usize| 0.2 + 1.25 * (((block * LANES + i) as f32 * 0.618_034).fract() * if i % 3 == 0 { 5.0 } else { 1.3 });
+            let turn = |i: usize| (block * LANES + i) as f32 * 0.754_878;
+            let across = Lanes2 { x: each(|i| width(i) * turn(i).cos()), y: each(|i| width(i) * turn(i).sin()) };
+            let down = Lanes2 { x: each(|i| 0.9 * width(i) * turn(i).sin()), y: each(|i| -0.9 * width(i) * turn(i).cos()) };
+            let found = Footprint::new(&cells, TapKind::Area, || [across, down], 1);
+            let [sides, softness] = [found.area, found.softness].map(|of| of.expect("both are known"));
+            for i in 0..LANES {
+                let at = |of: &Lanes2| DVec2::new(f64::from(of.x[i]), f64::from(of.y[i]));
+                assert_eq!(found.reads(i), 1.0);
+                match Twin::new(at(&across), at(&down), TapStage::Area).kernel {
+                    Kernel::Area(exact) => {
+                        areas += 1;
+                        assert!(found.is_wide(i) && at(&sides).distance(exact) < 1e-5, "{block} {i}: {} {exact}", at(&sides));
+                    }
+                    Kernel::Spline(exact) => {
+                        splines += 1;
+                        assert!(!found.is_wide(i) && at(&softness).distance(exact) < 1e-5, "{block} {i}: {} {exact}", at(&softness));
+                    }
+                    Kernel::Bilinear => panic!("neither"),
+                }
+            }
+        }
+        assert!(splines > 500 && areas > 500, "{splines} {areas}");
     }
 }

@@ -185,7 +185,7 @@ impl Reads<'_> {
         }
     }
 
-    /// Adds a sample for each pixel that takes one: a read of its grid, or the spline.
+    /// Adds a sample for each pixel that takes one: a read of its grid, its area, or the spline.
     #[inline(always)]
     fn add_sample(
         &self,

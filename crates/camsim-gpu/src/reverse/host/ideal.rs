@@ -241,14 +241,16 @@ impl<const TEXELS: usize> Span<TEXELS> {
     #[inline(always)]
     fn new(at_px: &Lanes, side_px: &Lanes) -> Self {
         let reach = each(|i| 0.5 * (side_px[i] + 1.0));
-        let first = each(|i| (at_px[i] - reach[i]).floor() + 1.0);
+        // From the place within its texel on, which is known to the last bit however far from the first one that is.
+        let base = each(|i| at_px[i].floor());
+        let begin = each(|i| (at_px[i] - base[i] - reach[i]).floor() + 1.0);
         let mut weights = [ZERO; TEXELS];
         for (k, weights) in weights.iter_mut().enumerate() {
             for i in 0..LANES {
-                weights[i] = within(reach[i] - (first[i] + k as f32 - at_px[i]).abs(), 1.0);
+                weights[i] = within(reach[i] - (begin[i] + k as f32 - (at_px[i] - base[i])).abs(), 1.0);
             }
         }
-        Self { first, weights }
+        Self { first: each(|i| base[i] + begin[i]), weights }
     }
 
     /// Where a read between a texel and the next one stands for both, and how much of them is covered.
