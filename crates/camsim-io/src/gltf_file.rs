@@ -231,6 +231,7 @@ impl Reader<'_> {
                     let beyond = Cell::new(false);
                     let made = primitive::Making {
                         source: self.source,
+                        mesh,
                         triangles,
                         mirrored,
                         uv: &uv,

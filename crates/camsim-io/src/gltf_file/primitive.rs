@@ -40,6 +40,8 @@ fn is_index(accessor: &gltf::Accessor<'_>) -> bool {
 /// What a primitive becomes a shape by.
 pub(super) struct Making<'a> {
     pub source: &'a Source,
+    /// Which it is of.
+    pub mesh: &'a gltf::Mesh<'a>,
     pub triangles: Triangles,
     /// Whether what it is placed by turns it inside out: its triangles are turned back.
     pub mirrored: bool,
@@ -149,7 +151,7 @@ impl Making<'_> {
     }
 
     fn wrong(&self, primitive: &gltf::Primitive<'_>, message: &str) -> GltfError {
-        self.source.broken(format!("a mesh's primitive {}: {message}", primitive.index()))
+        self.source.broken(format!("meshes.{}.primitives.{}: {message}", self.mesh.index(), primitive.index()))
     }
 
     fn positions(&self, primitive: &gltf::Primitive<'_>) -> Result<Vec<DVec3>, GltfError> {
