@@ -9,7 +9,7 @@ use camsim_core::{
     plan::PathStage,
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
-    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, KeyView, displacement::Twist, gather, reproject},
+    temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyView, displacement::Twist, gather, reproject},
 };
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -20,7 +20,7 @@ fn checker(size_px: [u32; 2]) -> Vec<f32> {
     (0..size_px[0] * size_px[1]).flat_map(|i| [value(i), value(i), value(i), 1.0]).collect()
 }
 
-const POINT: Footprint = Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], spline: Some(DVec2::ZERO) };
+const POINT: Footprint = Footprint { dx: DVec2::X, dy: DVec2::Y, taps: [1, 1], kernel: Kernel::Spline(DVec2::ZERO) };
 
 /// Difference, in 1/255, between camsim's samples and 8000 along the same straight path: RMS and largest over places and directions.
 fn blur_error(color: &ColorImage<'_>, length_px: f64) -> (f64, f64) {
