@@ -269,7 +269,8 @@ mod tests {
         let (mut splines, mut areas) = (0, 0);
         for block in 0..100 {
             // Narrow and wide ones in a block, on both sides of the width that tells them apart, turned and mirrored.
-            let width = |i: usize| 0.2 + 1.25 * (((block * LANES + i) as f32 * 0.618_034).fract() * if i % 3 == 0 { 5.0 } else { 1.3 });
+            let width =
+                |i: usize| 0.2 + 1.25 * (((block * LANES + i) as f32 * 0.618_034).fract() * if i.is_multiple_of(3) { 5.0 } else { 1.3 });
             let turn = |i: usize| (block * LANES + i) as f32 * 0.754_878;
             let across = Lanes2 { x: each(|i| width(i) * turn(i).cos()), y: each(|i| width(i) * turn(i).sin()) };
             let down = Lanes2 { x: each(|i| 0.9 * width(i) * turn(i).sin()), y: each(|i| -0.9 * width(i) * turn(i).cos()) };

@@ -342,12 +342,13 @@ mod tests {
         // From one to six texels along each axis; pixels of a block alike, or each with sides of its own.
         for (block, most) in (0..600).flat_map(|block| [1.0, 1.9, 2.9, 3.9, 5.0].map(|most| (block, most))) {
             let place = |i: usize| block * LANES + i;
-            let is_within = block % 3 != 0;
+            let is_within = !block.is_multiple_of(3);
             let at = |i: usize, step: f32, size: f32| {
                 if is_within { 4.0 + (size - 9.0) * part(place(i), step) } else { -6.0 + (size + 12.0) * part(place(i), step) }
             };
             let at_px = Lanes2 { x: each(|i| at(i, 0.754_878, 70.0)), y: each(|i| at(i, 0.569_84, 45.0)) };
-            let side = |i: usize, step: f32| 1.0 + (most - 1.0) * if block % 2 == 0 { part(block, step) } else { part(place(i), step) };
+            let side =
+                |i: usize, step: f32| 1.0 + (most - 1.0) * if block.is_multiple_of(2) { part(block, step) } else { part(place(i), step) };
             let sides_px = Lanes2 { x: each(|i| side(i, 0.324_718)), y: each(|i| side(i, 0.220_744)) };
             let is_taken = |i: usize| !(block + i).is_multiple_of(7);
             let mut found = [[0.0; 8]; LANES];
