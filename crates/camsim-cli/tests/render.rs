@@ -332,8 +332,8 @@ fn what_the_drawn_terrain_may_be_off_by_stands_beside() {
     let [fine, coarse] = [["0.25", "1"], ["20", "200"]].map(off_px);
     assert!(fine <= 0.25 && coarse > 1.0 && coarse <= 20.0, "{fine} {coarse}");
     // What the picture may be off by is kept all the same.
-    let within = off_px(["20", "1"]);
-    assert!(within > fine && within < 0.5 * coarse, "{within} {fine} {coarse}");
+    let [tight, loose] = [["20", "1"], ["20", "2"]].map(off_px);
+    assert!(tight < 0.5 * loose && loose < 0.5 * coarse, "{tight} {loose} {coarse}");
     let (code, out, err) = verify(&[]);
     assert!(code == 0 && out.contains("terrain off") && out.contains(&format!("| {fine:>11.3} | kept")), "{out}{err}");
 }
