@@ -72,7 +72,7 @@ fn tiles_show_what_one_texture_does() {
     let mut seen = Vec::new();
     // Straight down over so much ground that tiles make room for others, and for some of them again.
     let far: &[u64] = &[0, 6, 12, 16, 1];
-    for (max_error_dn, pitch_deg, frames) in [(16.0, -90.0, far), (0.05, -12.0, &[0, 6]), (0.6, -60.0, &[6]), (1.5, -45.0, &[6])] {
+    for (max_error_dn, pitch_deg, frames) in [(16.0, -90.0, far), (0.05, -12.0, &[0, 6]), (0.6, -60.0, &[6]), (1.0, -45.0, &[6])] {
         let sequence = flight(&ground, max_error_dn, pitch_deg);
         let (whole, reads, none) = ideal_frames(&sequence, None, frames);
         let (tiled, _, held) = ideal_frames(&sequence, Some(512), frames);

@@ -253,8 +253,15 @@ fn a_coarser_terrain_costs_what_is_predicted() {
         // Fine enough that sampling is not what is seen, and a tolerance that leaves the terrain what it is allowed.
         let coarse = |max_terrain_error_px: f64| {
             let ideal_scale = Auto::Value(2.0);
-            let quality =
-                QualitySpec { max_terrain_error_px, ideal_scale, max_error_px: 30.0, max_error_dn: 15.0, ..QualitySpec::default() };
+            let quality = QualitySpec {
+                max_terrain_error_px,
+                ideal_scale,
+                // By its depth, or sources beside their place would be all that is seen.
+                solver: Auto::Value(Solver::Reproject),
+                max_error_px: 30.0,
+                max_error_dn: 15.0,
+                ..QualitySpec::default()
+            };
             find(&engine, &truth, &case.sequence, quality)
         };
         for allowed_px in [0.02, 1.0, 3.0] {
