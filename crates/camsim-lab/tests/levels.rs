@@ -256,9 +256,8 @@ fn a_coarser_terrain_costs_what_is_predicted() {
             let quality = QualitySpec {
                 max_terrain_error_px,
                 ideal_scale,
-                // By its depth, or sources beside their place would be all that is seen.
-                solver: Auto::Value(Solver::Reproject),
-                max_error_px: 30.0,
+                // Or sources beside their place would be all that is seen.
+                max_error_px: 1.0,
                 max_error_dn: 15.0,
                 ..QualitySpec::default()
             };
