@@ -62,7 +62,8 @@ struct Frame {
     keys: u32,
     key_rows: u32,
     exposure_share: f32,
-    pad3: u32,
+    // Where a look-up of depth finds the sky, a surface so far away stands for it, pixels of the ideal frame (docs/ACCURACY.md, "Skylines").
+    sky_reach_px: f32,
     // Of each ideal frame: the plane that look-ups of depth begin with, whose inverse planar depth is the product with (u, v, 1), 1/m.
     planes: array<vec4<f32>, 4>,
 }

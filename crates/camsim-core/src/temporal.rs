@@ -113,6 +113,24 @@ pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> 
     }
 }
 
+/// How far from a surface pixels of the sky go with it, pixels of the camera: as far as reads reach, and what the surface may be beside where it is first looked for.
+pub const SKY_REACH_PX: f64 = 2.0;
+
+/// Where a surface is looked for around a place that shows the sky.
+pub(crate) const SKY_DIRECTIONS: [DVec2; 8] = {
+    const SIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+    [
+        DVec2::new(1.0, 0.0),
+        DVec2::new(SIDE, SIDE),
+        DVec2::new(0.0, 1.0),
+        DVec2::new(-SIDE, SIDE),
+        DVec2::new(-1.0, 0.0),
+        DVec2::new(-SIDE, -SIDE),
+        DVec2::new(0.0, -1.0),
+        DVec2::new(SIDE, -SIDE),
+    ]
+};
+
 /// What look-ups know of an ideal frame.
 #[derive(Clone, Copy, Debug)]
 pub struct KeyView<'a> {
@@ -122,6 +140,20 @@ pub struct KeyView<'a> {
     pub depth: &'a InverseDepthImage<'a>,
     /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m ([`crate::plan::SeenPlane`]). 0: infinitely far.
     pub plane: DVec3,
+    /// [`SKY_REACH_PX`] in pixels of the ideal frame: [`crate::plan::FramePlan::sky_reach_px`].
+    pub sky_reach_px: f64,
+}
+
+impl KeyView<'_> {
+    /// Inverse depth of the surface that a look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
+    /// anywhere, and a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two as it should.
+    fn surface_at(&self, at_px: DVec2) -> f64 {
+        let found = self.depth.inverse_depth(at_px);
+        if found > 0.0 {
+            return found;
+        }
+        SKY_DIRECTIONS.iter().map(|direction| self.depth.nearest(at_px + self.sky_reach_px * *direction)).fold(0.0, f64::max)
+    }
 }
 
 /// Where an output ray looks in the ideal frame.
@@ -212,7 +244,7 @@ fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), guess: Option<f64>, iteratio
     };
     let mut settled = Settled { in_key: guess.unwrap_or(0.0), on_line };
     for _ in 0..iterations {
-        let in_key = key.depth.inverse_depth(key.ideal.px_from_point(direction + settled.on_line * shift));
+        let in_key = key.surface_at(key.ideal.px_from_point(direction + settled.on_line * shift));
         settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
     }
     settled
@@ -377,7 +409,7 @@ mod tests {
             let d = uv.extend(1.0);
             let z = (1.0 - normal.dot(shift)) / normal.dot(rotation * d);
             let exact = ideal.px_from_point(rotation * d * z + shift);
-            let key = |plane| KeyView { ideal: &ideal, depth: &depth, plane };
+            let key = |plane| KeyView { ideal: &ideal, depth: &depth, plane, sky_reach_px: 0.0 };
             let far = key(DVec3::ZERO);
             let found = reproject(uv, (rotation, shift), 12, &far).expect("in view");
             // f32 depth: 6e-8 relative times about 8 px of parallax.

@@ -150,7 +150,7 @@ fn a_second_of_rolling_shutter_over_buildings() {
     let camera = CameraModel::from_spec(&spec).unwrap();
     let shutter = Shutter::from_spec(&readout, 30.0, spec.size_px).unwrap();
     let depth = InverseDepthImage { size_px: ideal.geometry.size_px, values: &ideal.inverse_depth };
-    let key = KeyView { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO };
+    let key = KeyView { ideal: &ideal.geometry, depth: &depth, plane: DVec3::ZERO, sky_reach_px: 0.0 };
     let pipelines = [Solver::Linear, Solver::Rk2, Solver::Reproject]
         .map(|solver| Pipeline::new(&spec, &ideal, &motion, &Settings { solver: Some(solver), ..Settings::default() }).unwrap());
     let mut errors: [Vec<f64>; 4] = Default::default();

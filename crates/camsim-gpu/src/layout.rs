@@ -47,7 +47,7 @@ pub struct FrameUniforms {
     pub keys: u32,
     pub key_rows: u32,
     pub exposure_share: f32,
-    pub pad3: u32,
+    pub sky_reach_px: f32,
     pub planes: [[f32; 4]; MAX_KEYS as usize],
 }
 
@@ -208,7 +208,7 @@ mod tests {
                 keys,
                 key_rows,
                 exposure_share,
-                pad3,
+                sky_reach_px,
                 planes,
             ]
         );

@@ -13,9 +13,35 @@ struct Settled {
     on_line: f32,
 }
 
+// Inverse depth of the surface that a look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
+// anywhere, and a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two as it should.
+fn surface_at(at_px: vec2<f32>) -> f32 {
+    let found = inverse_depth(at_px);
+    if (found > 0.0) {
+        return found;
+    }
+    let reach = frame.sky_reach_px;
+    let aslant = 0.70710678 * reach;
+    let along_axes = max(
+        max(depth_of_texel(at_px + vec2<f32>(reach, 0.0)), depth_of_texel(at_px - vec2<f32>(reach, 0.0))),
+        max(depth_of_texel(at_px + vec2<f32>(0.0, reach)), depth_of_texel(at_px - vec2<f32>(0.0, reach))),
+    );
+    let between_them = max(
+        max(depth_of_texel(at_px + vec2<f32>(aslant, aslant)), depth_of_texel(at_px - vec2<f32>(aslant, aslant))),
+        max(depth_of_texel(at_px + vec2<f32>(aslant, -aslant)), depth_of_texel(at_px - vec2<f32>(aslant, -aslant))),
+    );
+    return max(along_axes, between_them) * (1.0 / frame.near_m);
+}
+
+// Reversed depth of the texel that a place is in; places outside go to the frame's border.
+fn depth_of_texel(at_px: vec2<f32>) -> f32 {
+    let texel = vec2<i32>(clamp(floor(at_px + 0.5), vec2<f32>(0.0), vec2<f32>(frame.ideal_size_px) - 1.0));
+    return textureLoad(ideal_depth, texel + vec2<i32>(0, key_row()), 0).x;
+}
+
 // One look-up further.
 fn look(direction: vec3<f32>, shift: vec3<f32>, before: Settled) -> Settled {
-    let in_key = inverse_depth(ideal_px_from_point(direction + before.on_line * shift));
+    let in_key = surface_at(ideal_px_from_point(direction + before.on_line * shift));
     return Settled(in_key, depth_on_line(direction, shift, in_key, before.on_line));
 }
 

@@ -62,6 +62,10 @@ pub(super) struct Surroundings {
 #[derive(Clone, Debug)]
 pub(super) struct Contour {
     pub contrast2: f64,
+    /// Of the borders between two surfaces, where there are any: holes are beside these alone.
+    pub surfaces2: Option<f64>,
+    /// [`Contour::steps`] of those.
+    pub steps_between_surfaces: f64,
     path_px: f64,
     /// The probe's camera and ray, inverse depths on both sides of each border, and the direction across it.
     pose: CameraPose,
@@ -109,7 +113,7 @@ impl Contour {
     pub fn strip(&self, key_pose: &CameraPose, focal_px: DVec2) -> f64 {
         let strip_px = self.strip_px(key_pose, focal_px);
         let width_px = strip_px * strip_px / (strip_px.max(1.0) + self.path_px);
-        self.contrast2 * (width_px / f64::from(2 * NEAR_PX + 1)).min(1.0)
+        self.surfaces2.unwrap_or(0.0) * (width_px / f64::from(2 * NEAR_PX + 1)).min(1.0)
     }
 }
 
@@ -199,13 +203,21 @@ impl Search<'_> {
         // The exposure spreads it over its path.
         let of_ground = sides_px.map_or(0.0, |[side_px, path_px]| of_ground / (side_px * (side_px + path_px)));
         let sides_px = sides_px.filter(|_| has_border);
-        let contour = sides_px.filter(|_| !across.is_empty()).map(|[_, path_px]| Contour {
-            contrast2: gain2 * across.iter().map(contrast2).sum::<f64>() / across.len() as f64,
-            path_px,
-            pose,
-            uv: probe.uv,
-            across: across.iter().map(|ends| ends.map(|i| inverse_depth[i])).collect(),
-            normal,
+        let contour = sides_px.filter(|_| !across.is_empty()).map(|[_, path_px]| {
+            let of = |pair: &[usize; 2]| (pair.iter().all(|&i| inverse_depth[i] > 0.0), gain2 * contrast2(pair));
+            let (between_surfaces, before_sky): (Vec<_>, Vec<_>) =
+                across.iter().map(of).partition(|(is_between_surfaces, _)| *is_between_surfaces);
+            let [surfaces2, sky2] = [&between_surfaces, &before_sky].map(|of| of.iter().map(|(_, contrast2)| contrast2).sum::<f64>());
+            Contour {
+                contrast2: (surfaces2 + sky2) / across.len() as f64,
+                surfaces2: (!between_surfaces.is_empty()).then(|| surfaces2 / between_surfaces.len() as f64),
+                steps_between_surfaces: surfaces2 / across.len() as f64 / f64::from(2 * NEAR_PX + 1),
+                path_px,
+                pose,
+                uv: probe.uv,
+                across: across.iter().map(|ends| ends.map(|i| inverse_depth[i])).collect(),
+                normal,
+            }
         });
         Around {
             is_beside: contour.is_some() || crossed.borders > 0 || LINES.iter().any(is_fold),

@@ -25,8 +25,8 @@ use crate::{camera::CameraModel, pose::CameraPose, scene::TerrainDetail};
 
 /// Times what is expected: of a few hundred probes a few are at silhouettes.
 const SAFETY: f64 = 1.3;
-/// Spread of what a probe finds at borders, squared, of its mean: as many probes as found any are as sure of it as their number allows.
-const UNSURE: f64 = 0.7;
+/// Standard errors of what the probes find at borders, squared, that are added to it.
+pub(super) const UNSURE: f64 = 1.5;
 /// Times what is found at borders, squared, at most, that is taken to lie between those.
 const MOST_FINER: f64 = 2.0;
 /// Strips for each that is hidden: where one border of a surface uncovers what is behind it the other covers it up, and a pixel there may take either.
@@ -95,21 +95,28 @@ impl Outlook {
         let mean = |of: &dyn Fn(&Contour) -> f64| found().fold(0.0, |sum, contour| sum + of(contour)) / near.max(1) as f64;
         let share = near as f64 / around.len().max(1) as f64;
         let contrast2 = mean(&|contour| contour.contrast2);
+        let surfaces2: Vec<f64> = found().filter_map(|contour| contour.surfaces2).collect();
+        let hidden2 = if surfaces2.is_empty() { contrast2 } else { surfaces2.iter().sum::<f64>() / surfaces2.len() as f64 };
         // Few lines cross a border: where borders stand apart, what the wider look finds is surer.
         let over_all = |of: &dyn Fn(&Crossed) -> f64| {
             SAFETY * SAFETY * around.iter().fold(0.0, |sum, around| sum + of(&around.crossed)) / around.len().max(1) as f64
         };
-        let (of_probes, of_lines) = (SAFETY * SAFETY * share * mean(&Contour::steps), over_all(&|crossed| crossed.steps));
+        // Few probes are near the sky, whose border lines between them know.
+        let of_skyline = skyline.steps();
+        let at_probes = |contour: &Contour| if of_skyline.is_some() { contour.steps_between_surfaces } else { contour.steps() };
+        let of_skyline = SAFETY * SAFETY * of_skyline.unwrap_or(0.0);
+        let of_probes = SAFETY * SAFETY * share * mean(&at_probes) + of_skyline;
+        let of_lines = over_all(&|crossed| crossed.steps);
         let finer = finer(around);
-        let unsure = 1.0 + UNSURE / (around.iter().filter(|around| around.sides_px.is_some()).count().max(1) as f64).sqrt();
+        let unsure = unsure(around);
         Self {
             share: share.max(least_share),
             contrast_dn: 255.0 * contrast2.sqrt(),
             hidden_share: holes.share,
-            strips: STRIPS * contrast2 * holes.narrow_share
+            strips: STRIPS * hidden2 * holes.narrow_share
                 + share * mean(&|contour| contour.strip(key_pose, camera.focal_px))
                 + skyline.strips(key_pose, plane),
-            steps: unsure * of_probes.max(finer * of_lines),
+            steps: unsure * (of_probes.max(finer * of_lines) - of_skyline) + of_skyline,
             steps_apart: of_probes.max(of_lines / finer),
             flush: unsure * finer * over_all(&|crossed| crossed.flush),
             feet: unsure * finer * over_all(&|crossed| crossed.feet),
@@ -145,6 +152,13 @@ impl Outlook {
         let at_dn = if share > 0.0 { error_dn / share.sqrt() } else { 0.0 };
         Contours { share, contrast_dn, hidden_share, at_dn, error_dn }
     }
+}
+
+/// Times what is found at borders that there may well be, squared: where a few probes found most of it they tell less than as many alike.
+fn unsure(around: &[Around]) -> f64 {
+    let found = || around.iter().filter_map(Around::place).map(|(found, _)| found);
+    let [sum, squares] = found().fold([0.0; 2], |[sum, squares], found| [sum + found, squares + found * found]);
+    if sum > 0.0 { 1.0 + UNSURE * squares.sqrt() / sum } else { 1.0 }
 }
 
 /// Times the borders that are found there are more, nearer to each other than what is looked at: as many times as what is found thrice a pixel is more

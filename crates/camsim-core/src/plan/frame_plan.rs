@@ -11,7 +11,7 @@ use crate::{
     scenario::{Preset, QualitySpec},
     scene::LevelTolerance,
     shutter::Shutter,
-    temporal::{IdealGeometry, TapStage, displacement::Twist},
+    temporal::{IdealGeometry, SKY_REACH_PX, TapStage, displacement::Twist},
 };
 
 /// Part of the terrain's level of detail that models get: they are borders all over, of other colours than what is behind them.
@@ -156,6 +156,12 @@ impl FramePlan {
             travel_m: self.motion.travel_m,
             parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
         }
+    }
+
+    /// How far from a surface pixels of the sky go with it, pixels of the ideal frame: [`SKY_REACH_PX`].
+    #[must_use]
+    pub fn sky_reach_px(&self) -> f64 {
+        SKY_REACH_PX * self.ideal.scale(&self.camera)
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.

@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Frames of a group whose probes answer together for how much there is of borders.
-const TOGETHER: u64 = 4;
+const TOGETHER: u64 = 8;
 
 /// A frame before anything is chosen for it.
 #[derive(Clone)]

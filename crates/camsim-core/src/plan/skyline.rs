@@ -4,18 +4,20 @@
 //! L whose normal is n crosses `L sum |s.n| / A`. The lines are those from each probe to its neighbours: no ray is needed to know which of them cross it an odd number of times, and halving finds where
 //! some do, and which way it runs there.
 //!
-//! What is beyond it is as far as can be: from another place the surface before it is elsewhere by all of its own parallax, and the pixels between show sky for surface or surface for sky.
+//! What is beyond it is as far as can be: from another place the surface before it is elsewhere by all of its own parallax. Pixels that first look for a surface within [`SKY_REACH_PX`] of where it is go
+//! with it; farther away the pixels between show sky for surface or surface for sky.
 
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{SeenPlane, around::Search, probes::Probe, prospect::path_px};
+use super::{SeenPlane, around::Search, contours::UNSURE, probes::Probe, prospect::path_px};
 use crate::{
     pose::CameraPose,
     scene::{TerrainDetail, TerrainHit},
     silhouette::NEAR_PX,
+    temporal::SKY_REACH_PX,
 };
 
 /// Times what is expected: of some places, between which a skyline is more rugged. With it 0.63 to 1.01 of what is foretold was found with groups of eight frames over an alpine valley.
@@ -26,10 +28,14 @@ const SAFETY_OF_GROUND: f64 = 1.2;
 const NEIGHBOURS: f64 = 1.6;
 /// Crossings that are looked at, of all that there are.
 const MOST_LOOKS: usize = 24;
+/// From so many on they tell of its length more surely than the probes near it do.
+const ENOUGH: f64 = 24.0;
 /// Halvings from probe to probe, and from one direction to the next of those that are asked around a place.
 const HALVINGS: u32 = 8;
 const HALVINGS_AROUND: u32 = 4;
 const DIRECTIONS: u32 = 8;
+/// Part of [`SKY_REACH_PX`] at which a straight border is found whichever way it runs: that of eight directions.
+const REACHED: f64 = 0.92;
 /// Directions across it that are told apart.
 const ACROSS: usize = 12;
 
@@ -52,6 +58,8 @@ struct Place {
     pose: CameraPose,
     uv: DVec2,
     inverse_depth: f64,
+    /// How near the surface is that pixels of the sky there go with.
+    taken: f64,
     /// Across the skyline, towards the sky, where that is known.
     normal: Option<DVec2>,
     /// Where the ground is met there, and its place.
@@ -72,12 +80,12 @@ impl Place {
         };
         let guess = plane.seen_from(&self.pose).dot(self.uv.extend(1.0)).max(0.0);
         let moved = moved_px(self.inverse_depth);
-        let (moved_px, guess_px) = match self.normal {
-            Some(normal) => (normal.dot(moved), normal.dot(moved_px(guess))),
+        let (moved_px, guess_px, taken_px) = match self.normal {
+            Some(normal) => (normal.dot(moved), normal.dot(moved_px(guess)), normal.dot(moved_px(self.taken))),
             // Straight out, and never found.
-            None => (moved.length(), f64::INFINITY),
+            None => (moved.length(), f64::INFINITY, 0.0),
         };
-        let wrong_px = wrong_px(moved_px, guess_px);
+        let wrong_px = wrong_px(moved_px, guess_px, taken_px);
         // From a camera that has it behind it: of all that it could be.
         if !wrong_px.is_finite() {
             return 1.0;
@@ -107,15 +115,23 @@ impl Place {
     }
 }
 
-/// Pixels across a skyline, each by the square of what it shows too much or too little of the surface, where that is moved towards the sky by so much and looked for where a guess of its depth has it.
+/// Pixels across a skyline, each by the square of what it shows too much or too little of the surface, where that is moved towards the sky by so much, looked for where a guess of its depth has it, and what is
+/// beside it moved by so much.
 ///
-/// A pixel with its middle `s` beyond the skyline looks at `s + guess` first. If the surface is there, up to where it has moved, the pixel follows it and shows what it should. If not it follows the sky,
-/// which does not move, and shows what has come over it.
-fn wrong_px(moved_px: f64, guess_px: f64) -> f64 {
+/// A pixel with its middle `s` beyond the skyline looks at `s + guess` first. If the surface is there, up to where it has moved, the pixel follows it and shows what it should. If it is within reach the pixel
+/// moves as the surface there does, and finds the skyline moved by what that lacks. If not it follows the sky, which does not move, and shows what has come over it.
+fn wrong_px(moved_px: f64, guess_px: f64, taken_px: f64) -> f64 {
+    let found_px = moved_px - guess_px;
+    let beyond_reach_px = found_px + REACHED * SKY_REACH_PX;
+    off_px(moved_px - taken_px, [found_px, beyond_reach_px]) + off_px(moved_px, [beyond_reach_px, f64::INFINITY])
+}
+
+/// The same of pixels with their middles between two places, that show the skyline moved by so much.
+fn off_px(moved_px: f64, [from_px, to_px]: [f64; 2]) -> f64 {
     const STEPS: u32 = 32;
     let covered = |beyond_px: f64| (0.5 - beyond_px).clamp(0.0, 1.0);
-    let from_px = (moved_px - guess_px).max(-0.5 + moved_px.min(0.0));
-    let step_px = (0.5 + moved_px.max(0.0) - from_px).max(0.0) / f64::from(STEPS);
+    let from_px = from_px.max(-0.5 + moved_px.min(0.0));
+    let step_px = (to_px.min(0.5 + moved_px.max(0.0)) - from_px).max(0.0) / f64::from(STEPS);
     let places = (0..STEPS).map(|k| from_px + step_px * (f64::from(k) + 0.5));
     places.map(|s| (covered(s - moved_px) - covered(s)).powi(2) * step_px).sum()
 }
@@ -140,6 +156,13 @@ impl Skyline {
             times * place.contrast2 * place.wrong_px(key_pose, self.focal_px, plane) / self.looked_px(place.normal).max(1.0)
         };
         SAFETY * SAFETY * self.found.iter().map(of).sum::<f64>()
+    }
+
+    /// Squared contrast of it, times its length in pixels, mean over the pixels of the picture, that there may well be; `None` where few lines cross it.
+    pub fn steps(&self) -> Option<f64> {
+        let of = |(times, place): &(f64, Place)| times * place.contrast2 / self.looked_px(place.normal).max(1.0);
+        let crossings: f64 = self.found.iter().map(|(times, _)| times).sum();
+        (crossings >= ENOUGH).then(|| (1.0 + UNSURE / crossings.sqrt()) * self.found.iter().map(of).sum::<f64>())
     }
 
     /// The same where it is a ground that is drawn coarser than it is.
@@ -200,12 +223,14 @@ impl Search<'_> {
         let contrast = light(uv, Some(&met)) - light(self.reach.camera.unproject(sky_px)?, None);
         let pixel = surface_px.round().max(DVec2::ZERO).to_array().map(|px| px as u32);
         let focal_px = self.reach.camera.focal_px;
+        let normal = self.normal(surface_px);
         Some(Place {
             pixel,
             pose,
             uv,
             inverse_depth: met.depth_m.recip(),
-            normal: self.normal(surface_px),
+            taken: self.taken(surface_px, normal).unwrap_or(met.depth_m.recip()),
+            normal,
             ground: met.terrain.map(|hit| (hit, pose.position_ned_m + met.depth_m * way_ned(uv))),
             contrast2: (self.gain)(pixel).powi(2) * contrast.length_squared() / 3.0,
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), uv, met.depth_m.recip(), focal_px).0.length(),
@@ -234,6 +259,13 @@ impl Search<'_> {
         let across = (self.reach.camera.focal_px * (end(one)? - end(other)?)).perp().try_normalize()?;
         let towards_sky = self.reach.camera.focal_px * (uv_of_sky - self.reach.camera.unproject(at_px)?);
         Some(across * across.dot(towards_sky).signum())
+    }
+
+    /// How near the surface is, as far behind the skyline as pixels of the sky look for it.
+    fn taken(&self, at_px: DVec2, normal: Option<DVec2>) -> Option<f64> {
+        let (pose, uv, _) = self.look_at(at_px)?;
+        let behind = uv - SKY_REACH_PX * normal? / self.reach.camera.focal_px;
+        Some(self.surfaces.meet(pose.position_ned_m, pose.ned_from_camera * behind.extend(1.0))?.depth_m.recip())
     }
 
     fn halve(&self, mut sky_px: DVec2, mut surface_px: DVec2) -> Option<[DVec2; 2]> {
@@ -306,23 +338,24 @@ mod tests {
         let half = |odd: bool| skyline(&reach.with_half_the_probes(odd));
         let found = if by_halves { half(false).and(half(true)) } else { skyline(&reach) };
         let key_pose = path.pose(key_s);
-        let plane = SeenPlane { camera: key_pose, normal_per_m: 0.01 * DVec3::Z };
+        // Ten times as near as it is: looked for there, nobody finds the border that has come nearer to the sky.
+        let plane = SeenPlane { camera: key_pose, normal_per_m: 0.1 * DVec3::Z };
         found.strips(&key_pose, &plane)
     }
 
     #[test]
     fn a_skyline_that_is_elsewhere_in_the_ideal_frame_is_found_however_narrow_its_strip() {
-        // Of the board's two borders across the flight, and with white beyond black. Straight and along rows and columns, as the probes nearly are, they are found with the most scatter; and at the
+        // Of the board's two borders across the flight, each of which moves towards the sky from one of two frames, and with white beyond black. Straight and along rows and columns, as the probes nearly are, they are found with the most scatter; and at the
         // edges of the picture there are fewer lines. Over an exposure these move by as much as they are displaced in as long.
-        for (key_s, exposure_ms) in [(0.005_f64, 0.0), (-0.005, 0.0), (0.05, 0.0), (0.1, 0.0), (0.1, 20.0)] {
-            let [width_px, path_px] = [key_s.abs(), 1e-3 * exposure_ms].map(|s| FOCAL_PX * SPEED_M_S * s / 100.0);
-            let exact = |moved_px: f64| exactly(moved_px) * width_px.max(1.0) / (width_px.max(1.0) + path_px);
-            let wrong_px = exact(width_px) + exact(-width_px);
+        for (key_s, exposure_ms) in [(0.005, 0.0), (0.05, 0.0), (0.1, 0.0), (0.1, 20.0)] {
+            let [width_px, path_px] = [key_s, 1e-3 * exposure_ms].map(|s| FOCAL_PX * SPEED_M_S * s / 100.0);
+            let wrong_px = all_of(width_px) * width_px.max(1.0) / (width_px.max(1.0) + path_px);
             for by_halves in [false, true] {
                 let sides_px = [150.0, 171.0, 190.0, 203.0, 222.0, 240.0, 261.0];
                 let ratios = sides_px.map(|side_px| {
-                    let expected = SAFETY * SAFETY * side_px * wrong_px / 120_000.0;
-                    found(Board { side_px, exposure_ms, by_halves, ..BOARD }, key_s) / expected
+                    let expected = SAFETY * SAFETY * side_px * 2.0 * wrong_px / 120_000.0;
+                    let found = |key_s| found(Board { side_px, exposure_ms, by_halves, ..BOARD }, key_s);
+                    (found(key_s) + found(-key_s)) / expected
                 });
                 let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
                 assert!((1.0..1.35).contains(&mean), "{key_s} s, {width_px} px: {ratios:?}");
@@ -331,7 +364,12 @@ mod tests {
         }
     }
 
-    /// Where the guess is right: pixels with their middles beyond the skyline, in closed form.
+    /// Of all pixels, in closed form.
+    fn all_of(moved_px: f64) -> f64 {
+        if moved_px < 1.0 { moved_px * moved_px - moved_px.powi(3) / 3.0 } else { moved_px - 1.0 / 3.0 }
+    }
+
+    /// Of those with their middles beyond the skyline.
     fn exactly(moved_px: f64) -> f64 {
         let w = moved_px.abs();
         match (moved_px > 0.0, w) {
@@ -345,16 +383,29 @@ mod tests {
 
     #[test]
     fn pixels_that_find_the_surface_show_what_they_should() {
-        for moved_px in [0.02, 0.2, 0.5, 1.0, 2.5, -0.02, -0.2, -0.5, -0.8, -3.0] {
-            let found = wrong_px(moved_px, moved_px);
-            assert!((found / exactly(moved_px) - 1.0).abs() < 0.05, "{moved_px}: {found}");
-            assert_eq!(wrong_px(moved_px, f64::NEG_INFINITY), 0.0);
+        for moved_px in [0.02, 0.2, 0.5, 1.0, -0.02, -0.2, -0.5, -0.8, -1.3] {
+            // Looked for where it is, at once or beside it.
+            assert_eq!(wrong_px(moved_px, moved_px, moved_px), 0.0);
+            assert_eq!(wrong_px(moved_px, moved_px - REACHED * SKY_REACH_PX + 0.5, moved_px), 0.0);
+            assert_eq!(wrong_px(moved_px, f64::NEG_INFINITY, 0.0), 0.0);
+            // What is beside it may move less: by nothing as the sky, by a little more or less than half.
+            for part in [0.0, 0.5] {
+                let found = wrong_px(moved_px, moved_px, part * moved_px);
+                assert!((found / exactly((1.0 - part) * moved_px) - 1.0).abs() < 0.05, "{moved_px} {part}: {found}");
+            }
             // Whoever finds the sky only sees all of it.
-            let all = moved_px * moved_px - moved_px.abs().powi(3) / 3.0;
-            assert!(moved_px.abs() > 1.0 || (wrong_px(moved_px, f64::INFINITY) / all - 1.0).abs() < 0.05, "{moved_px}");
-            // A guess that is too near finds the sky where the surface has come over it, and the surface where that has gone.
-            let too_near = wrong_px(moved_px, 1.5 * moved_px);
-            assert!(if moved_px > 0.0 { too_near > found } else { too_near < found }, "{moved_px}");
+            let of_all = wrong_px(moved_px, f64::INFINITY, moved_px) / all_of(moved_px.abs());
+            assert!((of_all - 1.0).abs() < 0.05, "{moved_px}: {of_all}");
+            // A guess that is far too near finds the sky where the surface has come over it, and the surface where that has gone.
+            let too_near = wrong_px(moved_px, 300.0 * moved_px, moved_px);
+            assert!(if moved_px > 0.0 { too_near > 0.0 } else { too_near == 0.0 }, "{moved_px}: {too_near}");
+        }
+        // Beyond the reach: shown where it is not from there on, and not shown where it is up to there.
+        for moved_px in [3.0, 5.0] {
+            let over = wrong_px(moved_px, moved_px, moved_px);
+            assert!((over - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * over, "{moved_px}: {over}");
+            let gone = wrong_px(-moved_px, 0.0, -moved_px);
+            assert!((gone - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * gone, "{moved_px}: {gone}");
         }
     }
 

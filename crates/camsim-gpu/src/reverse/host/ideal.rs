@@ -5,6 +5,12 @@ use crate::host::lanes::{LANES, Lanes, Lanes2, ZERO, each, higher, lower, whole,
 use crate::host::vectors::Vectors;
 use crate::layout::FrameUniforms;
 
+/// Where surfaces beside the sky are looked for.
+const DIRECTIONS: [[f32; 2]; 8] = {
+    const SIDE: f32 = std::f32::consts::FRAC_1_SQRT_2;
+    [[1.0, 0.0], [SIDE, SIDE], [0.0, 1.0], [-SIDE, SIDE], [-1.0, 0.0], [-SIDE, -SIDE], [0.0, -1.0], [SIDE, -SIDE]]
+};
+
 /// Half floats of a texel.
 pub(super) const CHANNELS: usize = 4;
 
@@ -66,6 +72,38 @@ impl IdealOnHost<'_> {
             let nearest = if t.y[i] > 0.5 { bottom } else { top };
             per_m * if low > 0.9 * high { mixed } else { nearest }
         })
+    }
+
+    /// The same, and where it finds the sky that of the nearest surface of those within reach: twin of `surface_at` in shaders/reverse/temporal_inverse/reproject.wgsl.
+    #[inline(always)]
+    pub(super) fn surface_at(&self, frame: &FrameUniforms, at_px: &Lanes2) -> Lanes {
+        let mut found = self.inverse_depth(frame, at_px);
+        let mut is_sky = false;
+        for i in 0..LANES {
+            is_sky |= found[i] == 0.0;
+        }
+        if !is_sky {
+            return found;
+        }
+        let last = frame.ideal_size_px.map(|size| (size - 1) as f32);
+        let mut nearest = ZERO;
+        for [right, down] in DIRECTIONS {
+            let x = each(|i| within((frame.sky_reach_px.mul_add(right, at_px.x[i]) + 0.5).floor(), last[0]));
+            let y = each(|i| within((frame.sky_reach_px.mul_add(down, at_px.y[i]) + 0.5).floor(), last[1]));
+            for i in 0..LANES {
+                if found[i] == 0.0 {
+                    let texel = whole(y[i]) as usize * self.depth_stride as usize + whole(x[i]) as usize;
+                    nearest[i] = higher(nearest[i], self.depth.get(texel).copied().unwrap_or(0.0));
+                }
+            }
+        }
+        let per_m = 1.0 / frame.near_m;
+        for i in 0..LANES {
+            if found[i] == 0.0 {
+                found[i] = per_m * nearest[i];
+            }
+        }
+        found
     }
 
     /// Adds a bilinear read of linear colour, times a weight, for each pixel that takes one: what its left texels give and what its right ones do.

@@ -77,7 +77,7 @@ impl Reads<'_> {
             let x = each(|i| on_line[i].mul_add(shift[0], direction.x[i]));
             let y = each(|i| on_line[i].mul_add(shift[1], direction.y[i]));
             let at_px = self.ideal_px(&x, &y, |i| 1.0 / on_line[i].mul_add(shift[2], direction.z[i]));
-            in_key = self.ideal.inverse_depth(self.frame, &at_px);
+            in_key = self.ideal.surface_at(self.frame, &at_px);
             on_line = Self::depth_on_line(direction, shift, &in_key, &on_line);
         }
         (in_key, on_line)

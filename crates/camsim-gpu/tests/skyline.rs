@@ -1,0 +1,118 @@
+//! Pixels of the sky beside a surface go with it: a skyline is where it is, wherever the ideal frame has it.
+
+mod common;
+
+use std::sync::Arc;
+
+use camsim_core::{
+    plan::TemporalStage,
+    reference::{Oracle, RenderOptions},
+    scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
+    scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
+    sequence::Sequence,
+    temporal::{ColorImage, InverseDepthImage, KeyView, SKY_REACH_PX, reproject},
+};
+use camsim_gpu::reverse::host::ReverseOn;
+use common::{engine, scenario, sequence, steady};
+use glam::{DMat3, DVec2, DVec3};
+
+const SIZE_PX: [u32; 2] = [200, 150];
+
+/// A black wall 60 m to the north, before a white sky.
+fn wall() -> Scene {
+    let corners = [[0.0, -16.0, 10.0], [0.0, 14.0, 10.0], [0.0, 14.0, -32.0], [0.0, -16.0, -24.0_f32]];
+    let vertices = corners.map(|corner| MeshVertex::new(corner, [0.0; 2])).to_vec();
+    let black = Arc::new(Texture::uniform([0, 0, 0, 255], Encoding::Linear));
+    let wall = Mesh::new(vertices, vec![0, 1, 2, 0, 2, 3], black, DVec3::new(60.0, 0.0, 0.0), Wrap::Clamp);
+    Scene { meshes: vec![wall], sky_linear: [1.0; 3], ..Scene::default() }
+}
+
+/// Level, 12 m above the wall's foot, flying past it.
+fn flying_past(exposure_ms: f64, speed_m_s: f64) -> Arc<Sequence> {
+    let mut scenario: Scenario = scenario();
+    scenario.camera.size_px = SIZE_PX;
+    scenario.camera.focal_px = [160.0, 160.0];
+    scenario.camera.mount = MountSpec { angles_deg: [2.0, 0.0, 0.0], ..MountSpec::default() };
+    scenario.camera.shutter = ShutterSpec { readout_ms: 33.0, exposure_ms, ..ShutterSpec::default() };
+    scenario.quality.solver = Auto::Value(Solver::Reproject);
+    scenario.quality.silhouettes = Silhouettes::Plain;
+    scenario.quality.ideal_scale = Auto::Value(2.0);
+    sequence(scenario, steady(12.0, 0.0, DVec3::new(0.0, speed_m_s, 0.0), DVec3::new(0.0, 0.0, 0.1)), wall())
+}
+
+/// RMS over the picture, 1/255 of the linear range.
+fn rms_dn(found: &[f32], truth: &[f32]) -> f64 {
+    let squares: f64 = found.iter().zip(truth).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    255.0 * (squares / found.len() as f64).sqrt()
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn a_skyline_is_where_it_is_from_an_ideal_frame_that_has_it_elsewhere() {
+    // At the first and the last line the wall is up to 1.3 px elsewhere in the ideal frame, and as much more with twice the speed.
+    for exposure_ms in [0.0, 6.0] {
+        let made = |speed_m_s: f64, place: ReverseOn| {
+            let sequence = flying_past(exposure_ms, speed_m_s);
+            let mut engine = engine();
+            engine.set_reverse_on(place);
+            let done = common::render(&engine, &sequence, &[Channel::Color], 0);
+            let truth = Oracle::new(sequence).expect("oracle").render(0, &RenderOptions::default());
+            rms_dn(&done.frame.color_rgba, &truth.color_rgba)
+        };
+        for place in [ReverseOn::Host, ReverseOn::Device] {
+            let [still, slow, fast] = [0.0, 30.0, 60.0].map(|speed_m_s| made(speed_m_s, place));
+            eprintln!("{exposure_ms} ms, {place:?}: {still:.3}, {slow:.3}, {fast:.3}/255");
+            // What stays are stairs of the ideal frame's pixels, which a border aslant by the readout has more of: eight times as much would stay without the reach (below).
+            assert!(still > 0.5 && slow < 1.4 * still && fast < 1.4 * still, "{still} {slow} {fast}");
+        }
+    }
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
+    let sequence = flying_past(0.0, 60.0);
+    let truth = Oracle::new(sequence.clone()).expect("oracle").render(0, &RenderOptions::default());
+    for place in [ReverseOn::Host, ReverseOn::Device] {
+        let mut engine = engine();
+        engine.set_reverse_on(place);
+        let mut session = engine.session::<std::convert::Infallible>(sequence.clone(), &[Channel::Color]).expect("session");
+        let mut found = None;
+        let mut keep = |finished| {
+            found = Some(finished);
+            Ok(())
+        };
+        session.render::<std::convert::Infallible>([0], &mut keep).expect("render");
+        let (ideal, color, depth) = session.read_ideal().expect("readable").expect("drawn");
+        let done = found.expect("one frame");
+        let plan = &done.plan;
+        let TemporalStage::Reproject { iterations } = plan.temporal else { panic!("{:?}", plan.temporal) };
+        let depth = InverseDepthImage { size_px: ideal.size_px, values: &depth };
+        let color = ColorImage { size_px: ideal.size_px, rgba: &color };
+        let plane = plan.plane.seen_from(&plan.keys[0].pose);
+        assert_eq!(plan.sky_reach_px(), 2.0 * SKY_REACH_PX);
+        // Where the twin looks, and what a plain read finds there: which kernel reads does not matter here.
+        let source_px = |[x, y]: [u32; 2], sky_reach_px: f64| {
+            let key = KeyView { ideal: &ideal, depth: &depth, plane, sky_reach_px };
+            let pose = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y));
+            let (rotation, shift): (DMat3, DVec3) = pose.relative_to(&plan.keys[0].pose);
+            let uv = (DVec2::new(f64::from(x), f64::from(y)) - plan.camera.principal_point_px) / plan.camera.focal_px;
+            reproject(uv, (rotation, shift), iterations, &key).map(|source| source.at_px)
+        };
+        let (mut differ, mut squares) = (0, [0.0; 2]);
+        for i in 0..SIZE_PX[0] * SIZE_PX[1] {
+            let pixel = [i % SIZE_PX[0], i / SIZE_PX[0]];
+            let [with, without] = [plan.sky_reach_px(), 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
+            let of = |at_px: DVec2| color.sample(at_px).x;
+            let [rendered, exact] = [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba[4 * i as usize]));
+            // Of a kernel that reads more sharply or more softly than the twin here: what is sky or wall all around is so for both.
+            differ += u32::from((rendered - of(with)).abs() > 0.3);
+            squares[0] += (of(with) - exact).powi(2);
+            squares[1] += (of(without) - exact).powi(2);
+        }
+        let [with, without] = squares.map(|squares: f64| 255.0 * (squares / f64::from(SIZE_PX[0] * SIZE_PX[1])).sqrt());
+        eprintln!("{place:?}: {differ} pixels differ; {with:.2}/255 with a reach, {without:.2} without");
+        assert!(differ < 10, "{place:?}: {differ}");
+        assert!(with < 0.5 * without, "{with} {without}");
+    }
+}
