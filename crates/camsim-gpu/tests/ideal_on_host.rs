@@ -252,8 +252,10 @@ fn the_host_draws_what_the_device_draws() {
     }
     let coarse = &[("quality.ideal_scale", "1.0"), ("quality.max_error_dn", "0.1")][..];
     let sharp = &[("quality.ideal_scale", "1.41"), ("camera.shutter.exposure_ms", "0")];
+    let exact = &[("quality.max_error_dn", "0.5")];
     for (file, sets, frames) in [
         ("assets/demo.toml", &[][..], [3, 70]),
+        ("assets/demo.toml", exact, [40, 52]),
         ("assets/demo.toml", coarse, [3, 70]),
         ("benches/all_effects.toml", &[], [52, 98]),
         ("benches/all_effects.toml", sharp, [52, 60]),
