@@ -152,13 +152,17 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     for node in scene.nodes() {
         reader.node(&node, DAffine3::IDENTITY, 0)?;
     }
-    let Reader { parts, mut notes, materials, reach_m, .. } = reader;
+    let Reader { parts, mut notes, materials, reach_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
     if parts.is_empty() {
         notes.push("has no triangles: nothing of it is shown".into());
     }
     if options.time_s.is_some() && document.animations().next().is_none() {
         notes.push("has no animation for time_s to be a time of: its nodes are as they stand".into());
     }
+    if options.time_s.is_none() && options.animation.is_some() {
+        notes.push("animation says nothing without time_s: its nodes are as they stand; give the time of the file that is meant".into());
+    }
+    notes.extend(pose_notes);
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();

@@ -25,19 +25,29 @@ pub(super) fn check_version(json: &Value) -> Result<(), String> {
     }
 }
 
-/// Refuses extensions that a file requires, or that its textures have nothing but.
+/// Refuses extensions that a file requires, or that its textures or primitives have nothing but.
 pub(super) fn check_extensions(path: &Path, json: &Value) -> Result<(), GltfError> {
     let required = list(json, "extensionsRequired").iter().filter_map(Value::as_str);
     let known = |name: &str| DONE.contains(&name) || NO_MATTER.iter().any(|known| name.starts_with(known));
     let alone = list(json, "textures").iter().filter(|texture| texture.get("source").is_none());
     let alone = alone.filter_map(|texture| texture.get("extensions")?.as_object()?.keys().next().map(String::as_str));
-    let Some(name) = required.filter(|name| !known(name)).chain(alone).next() else { return Ok(()) };
+    let compressed = list(json, "meshes").iter().flat_map(|mesh| list(mesh, "primitives")).any(|primitive| is_compressed(json, primitive));
+    let compressed = compressed.then_some("KHR_draco_mesh_compression");
+    let Some(name) = required.filter(|name| !known(name)).chain(alone).chain(compressed).next() else { return Ok(()) };
     let fix = match name {
         "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => "write the file again without compression",
         "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" => "write its pictures as PNG or JPEG",
         _ => "write the file again without it",
     };
     Err(GltfError::Extension { path: path.into(), extension: name.into(), fix })
+}
+
+/// Whether a primitive's corners are in no buffer but that of the extension.
+fn is_compressed(json: &Value, primitive: &Value) -> bool {
+    let position = primitive.pointer("/attributes/POSITION").and_then(Value::as_u64);
+    let has_data = |accessor: &Value| accessor.get("bufferView").is_some() || accessor.get("sparse").is_some();
+    primitive.pointer("/extensions/KHR_draco_mesh_compression").is_some()
+        && position.and_then(|index| list(json, "accessors").get(index as usize)).is_some_and(|accessor| !has_data(accessor))
 }
 
 /// What the glTF crate takes for granted: accessors that it looks at before it knows that they are there, and nodes that are animated.

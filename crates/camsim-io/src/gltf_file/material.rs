@@ -67,13 +67,18 @@ impl<'a> Materials<'a> {
         if let Some(known) = self.known.get(&material.index()) {
             return Ok(known.clone());
         }
-        let base = material.pbr_metallic_roughness();
-        let (factor, emitted) = (base.base_color_factor(), material.emissive_factor());
-        self.check_factors(material, &factor, &emitted)?;
+        // What files from before metals and roughness call the diffuse colour is the base colour of what shines in no other way.
+        let (diffuse, base) = (material.pbr_specular_glossiness(), material.pbr_metallic_roughness());
+        let (key, factor, base_texture) = match &diffuse {
+            Some(of) => ("extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", of.diffuse_factor(), of.diffuse_texture()),
+            None => ("pbrMetallicRoughness.baseColorFactor", base.base_color_factor(), base.base_color_texture()),
+        };
+        let emitted = material.emissive_factor();
+        self.check_factors(material, [(key, &factor), ("emissiveFactor", &emitted)])?;
         let emits = emitted.iter().any(|&part| part > 0.0);
         // Alpha is the base colour's, black or not.
         let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
-        let black = factor[..3].iter().all(|&part| part == 0.0) && !(has_alpha && base.base_color_texture().is_some());
+        let black = factor[..3].iter().all(|&part| part == 0.0) && !(has_alpha && base_texture.is_some());
         let mut rule = UvRule {
             set: 0,
             offset: [0.0; 2],
@@ -86,7 +91,7 @@ impl<'a> Materials<'a> {
         };
         let mut emissive = [0.0; 3];
         let mut on_top = None;
-        let info = match (base.base_color_texture(), material.emissive_texture()) {
+        let info = match (base_texture, material.emissive_texture()) {
             // Nothing but what is emitted.
             (_, Some(info)) if emits && black => {
                 rule.factor = [emitted[0], emitted[1], emitted[2], factor[3]];
@@ -132,9 +137,9 @@ impl<'a> Materials<'a> {
     }
 
     /// Refuses factors that are no numbers, and says which are beyond what there is.
-    fn check_factors(&mut self, material: &gltf::Material<'_>, base: &[f32], emitted: &[f32]) -> Result<(), GltfError> {
+    fn check_factors(&mut self, material: &gltf::Material<'_>, factors: [(&str, &[f32]); 2]) -> Result<(), GltfError> {
         let name = material.index().map_or_else(|| "the material of what has none".to_owned(), |index| format!("materials.{index}"));
-        for (key, parts) in [("pbrMetallicRoughness.baseColorFactor", base), ("emissiveFactor", emitted)] {
+        for (key, parts) in factors {
             if parts.iter().any(|part| !part.is_finite()) {
                 return Err(self.source.broken(format!("{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1")));
             }

@@ -16,6 +16,8 @@ pub(super) struct Pose {
     weights: HashMap<usize, Vec<f64>>,
     /// From each node to the model, of all nodes, once a skin asks.
     model_from_node: HashMap<usize, DAffine3>,
+    /// What two animations disagree about.
+    pub note: Option<String>,
 }
 
 impl Pose {
@@ -26,7 +28,16 @@ impl Pose {
         }
         if let Some(time_s) = options.time_s {
             let chosen = |animation: &gltf::Animation<'_>| options.animation.is_none_or(|n| animation.index() == n);
+            // By node and property, which animation it was.
+            let mut moved = HashMap::new();
             for channel in source.document.animations().filter(chosen).flat_map(|animation| animation.channels().collect::<Vec<_>>()) {
+                let (node, animation) = (channel.target().node().index(), channel.animation().index());
+                let before = moved.insert((node, channel.target().property() as u8), animation);
+                if let Some(before) = before.filter(|&before| before != animation && pose.note.is_none()) {
+                    pose.note = Some(format!(
+                        "animations {before} and {animation} both move node {node}, and the later counts: choose one with scene.gltf.animation"
+                    ));
+                }
                 pose.channel(source, &channel, time_s)?;
             }
         }

@@ -402,3 +402,61 @@ fn a_real_model_blends_what_it_says() {
     }
     assert!(found.contains(&(false, None)), "{found:?}");
 }
+
+#[test]
+fn the_diffuse_colour_of_older_files_is_their_base_colour() {
+    let material = |rest: &str| format!(r#", "material": 0 }}] }}], "materials": [{{ {rest} }}], "unknown": [{{ "none": [{{ "x": 0"#);
+    let diffuse = r#""extensions": { "KHR_materials_pbrSpecularGlossiness": { "diffuseFactor": [0.25, 0.5, 0.75, 1.0] } }"#;
+    let tint = |rest: &str| square(4, &material(rest), r#"{ "mesh": 0 }"#).map(|model| corners_tints(&model));
+    assert_eq!(tint(diffuse).unwrap(), vec![[0.25, 0.5, 0.75, 1.0]; 4]);
+    assert_eq!(tint("").unwrap(), vec![[1.0; 4]; 4]);
+    let error = tint(&diffuse.replace("0.25", "1e39")).unwrap_err();
+    assert!(error.contains("materials.0: extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor"), "{error}");
+}
+
+fn corners_tints(model: &Model) -> Vec<[f32; 4]> {
+    model.place(DVec3::ZERO, 0.0, 1.0).flat_map(|mesh| mesh.shape.vertices.iter().map(|vertex| vertex.tint).collect::<Vec<_>>()).collect()
+}
+
+#[test]
+fn animations_that_nothing_or_too_much_is_asked_of_are_noted() {
+    let animation =
+        r#"{ "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }], "samplers": [{ "input": 1, "output": 0 }] }"#;
+    let read = |count: usize, options: GltfOptions| {
+        let bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+        let animations = vec![animation; count].join(", ");
+        let rest = format!(
+            r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}, {{ "buffer": 0, "byteOffset": 48, "byteLength": 16 }}],
+            "accessors": [{{ "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }},
+                {{ "bufferView": 1, "componentType": 5126, "count": 4, "type": "SCALAR", "min": [0], "max": [3] }}],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}, "mode": 5 }}] }}], "animations": [{animations}],
+            "nodes": [{{ "mesh": 0 }}], "scenes": [{{ "nodes": [0] }}]"#
+        );
+        model(&bytes, &rest, options).unwrap().notes
+    };
+    let at = |time_s: Option<f64>, animation: Option<usize>| GltfOptions { time_s, animation, ..GltfOptions::default() };
+    assert_eq!(read(1, at(Some(1.0), None)), Vec::<String>::new());
+    assert_eq!(read(2, at(Some(1.0), Some(1))), Vec::<String>::new());
+    let [unasked] = read(1, at(None, Some(0))).try_into().unwrap();
+    assert!(unasked.contains("animation says nothing without time_s"), "{unasked}");
+    let [mixed] = read(3, at(Some(1.0), None)).try_into().unwrap();
+    assert!(mixed.contains("animations 0 and 1 both move node 0"), "{mixed}");
+}
+
+#[test]
+fn corners_in_a_compressed_buffer_alone_are_named_by_their_extension() {
+    let rest = |view: &str| {
+        format!(
+            r#""bufferViews": [{{ "buffer": 0, "byteLength": 48 }}], "extensionsUsed": ["KHR_draco_mesh_compression"],
+            "accessors": [{{ {view} "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] }}],
+            "meshes": [{{ "primitives": [{{ "attributes": {{ "POSITION": 0 }}, "mode": 5,
+                "extensions": {{ "KHR_draco_mesh_compression": {{ "bufferView": 0, "attributes": {{ "POSITION": 0 }} }} }} }}] }}],
+            "nodes": [{{ "mesh": 0 }}], "scenes": [{{ "nodes": [0] }}]"#
+        )
+    };
+    let bytes = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0]);
+    let error = model(&bytes, &rest(""), GltfOptions::default()).unwrap_err();
+    assert!(error.contains("KHR_draco_mesh_compression") && error.contains("without compression"), "{error}");
+    // With what readers without it are given instead.
+    assert_eq!(corners(&model(&bytes, &rest(r#""bufferView": 0,"#), GltfOptions::default()).unwrap()).len(), 2);
+}

@@ -43,7 +43,18 @@ pub(super) fn read_placements(path: &Path, on_ground: bool) -> Result<Vec<Placem
     let is_local = match (complete(local), complete(earth)) {
         (true, false) => true,
         (false, true) => false,
-        _ => return Err(fail(format!("line 1: places are missing, or there are two kinds of them; {COLUMNS}"))),
+        _ => {
+            let missing =
+                [("d_m", local), ("height_m", earth)].into_iter().find(|(_, of)| of[0].is_some() && of[1].is_some() && of[2].is_none());
+            return Err(fail(match missing {
+                Some((name, _)) if !on_ground => {
+                    format!(
+                        "line 1: the column `{name}` is missing; give it, or set scene.gltf.on_ground = true for what stands on the terrain"
+                    )
+                }
+                _ => format!("line 1: places are missing, or there are two kinds of them; {COLUMNS}"),
+            }));
+        }
     };
     let mut places = Vec::new();
     for record in reader.records() {
@@ -101,7 +112,9 @@ mod tests {
     #[test]
     fn wrong_tables_are_named_by_line() {
         for (text, on_ground, wanted) in [
-            ("n_m,e_m\n1,2\n", false, "line 1: places are missing"),
+            ("n_m,e_m\n1,2\n", false, "line 1: the column `d_m` is missing; give it, or set scene.gltf.on_ground"),
+            ("lon_deg,lat_deg\n1,2\n", false, "line 1: the column `height_m` is missing"),
+            ("n_m,d_m\n1,2\n", false, "line 1: places are missing"),
             ("n_m,e_m,lat_deg,lon_deg\n1,2,3,4\n", true, "two kinds"),
             ("n_m,e_m,size\n1,2,3\n", true, "the column `size`"),
             ("n_m,e_m,d_m,n_m\n1,2,3,4\n", false, "line 1: there are two columns `n_m`"),
