@@ -145,7 +145,7 @@ pub struct KeyView<'a> {
 }
 
 impl KeyView<'_> {
-    /// Inverse depth of the surface that a look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
+    /// Inverse depth of the surface that the last look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
     /// anywhere, and a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two as it should.
     fn surface_at(&self, at_px: DVec2) -> f64 {
         let found = self.depth.inverse_depth(at_px);
@@ -243,8 +243,9 @@ fn settle(uv: DVec2, key_from_line: (DMat3, DVec3), guess: Option<f64>, iteratio
         None => plane_on_line(direction, shift, key.plane),
     };
     let mut settled = Settled { in_key: guess.unwrap_or(0.0), on_line };
-    for _ in 0..iterations {
-        let in_key = key.surface_at(key.ideal.px_from_point(direction + settled.on_line * shift));
+    for look in 1..=iterations {
+        let at_px = key.ideal.px_from_point(direction + settled.on_line * shift);
+        let in_key = if look < iterations { key.depth.inverse_depth(at_px) } else { key.surface_at(at_px) };
         settled = Settled { in_key, on_line: depth_on_line(direction, shift, in_key).unwrap_or(settled.on_line) };
     }
     settled

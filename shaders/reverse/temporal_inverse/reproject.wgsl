@@ -13,7 +13,7 @@ struct Settled {
     on_line: f32,
 }
 
-// Inverse depth of the surface that a look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
+// Inverse depth of the surface that the last look-up finds, 1/m. Where it finds the sky, that of the nearest surface of those within reach: the sky is of one colour, so that it may be read
 // anywhere, and a pixel beside a surface that reads where it is beside that surface in the ideal frame mixes the two as it should.
 fn surface_at(at_px: vec2<f32>) -> f32 {
     let found = inverse_depth(at_px);
@@ -41,7 +41,15 @@ fn depth_of_texel(at_px: vec2<f32>) -> f32 {
 
 // One look-up further.
 fn look(direction: vec3<f32>, shift: vec3<f32>, before: Settled) -> Settled {
-    let in_key = surface_at(ideal_px_from_point(direction + before.on_line * shift));
+    return settled_at(direction, shift, before, inverse_depth(ideal_px_from_point(direction + before.on_line * shift)));
+}
+
+// The last one.
+fn last_look(direction: vec3<f32>, shift: vec3<f32>, before: Settled) -> Settled {
+    return settled_at(direction, shift, before, surface_at(ideal_px_from_point(direction + before.on_line * shift)));
+}
+
+fn settled_at(direction: vec3<f32>, shift: vec3<f32>, before: Settled, in_key: f32) -> Settled {
     return Settled(in_key, depth_on_line(direction, shift, in_key, before.on_line));
 }
 

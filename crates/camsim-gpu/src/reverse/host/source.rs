@@ -69,15 +69,15 @@ impl Reads<'_> {
         })
     }
 
-    /// Look-ups from a guess on the line on: the key frame's inverse depth that the last one finds, and what that is on the line.
+    /// Look-ups from a guess on the line on, the last of them beside the sky too: the key frame's inverse depth that the last one finds, and what that is on the line.
     #[inline(always)]
     fn looks(&self, direction: &Lanes3, shift: [f32; 3], guess: &Lanes, count: u32) -> (Lanes, Lanes) {
         let (mut in_key, mut on_line) = (ZERO, *guess);
-        for _ in 0..count {
+        for look in 1..=count {
             let x = each(|i| on_line[i].mul_add(shift[0], direction.x[i]));
             let y = each(|i| on_line[i].mul_add(shift[1], direction.y[i]));
             let at_px = self.ideal_px(&x, &y, |i| 1.0 / on_line[i].mul_add(shift[2], direction.z[i]));
-            in_key = self.ideal.surface_at(self.frame, &at_px);
+            in_key = if look < count { self.ideal.inverse_depth(self.frame, &at_px) } else { self.ideal.surface_at(self.frame, &at_px) };
             on_line = Self::depth_on_line(direction, shift, &in_key, &on_line);
         }
         (in_key, on_line)
