@@ -14,7 +14,7 @@ use crate::{
     scenario::{Auto, Channel},
     sequence::Sequence,
     shutter::{LinesAxis, Shutter},
-    temporal::IdealGeometry,
+    temporal::{IdealGeometry, SKY_REACH_PX},
 };
 
 mod around;
@@ -386,6 +386,7 @@ impl Planner {
             surface_reads: sampling.surface_reads,
             samples_a_pixel: sampling.samples_a_pixel,
             taps: sampling.taps,
+            sky_reach_px: if self.surfaces.blends() { 0.0 } else { SKY_REACH_PX * ideal.scale(camera) },
             linear_fog: if look.is_paper() { paper::fog(&self.sequence.scene) } else { None },
             truth: self.truth,
             motion,

@@ -140,7 +140,7 @@ pub struct KeyView<'a> {
     pub depth: &'a InverseDepthImage<'a>,
     /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m ([`crate::plan::SeenPlane`]). 0: infinitely far.
     pub plane: DVec3,
-    /// [`SKY_REACH_PX`] in pixels of the ideal frame: [`crate::plan::FramePlan::sky_reach_px`].
+    /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0: [`crate::plan::FramePlan::sky_reach_px`].
     pub sky_reach_px: f64,
 }
 

@@ -378,7 +378,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         lens_radial: [lens(0), lens(1), lens(4)],
         lens_tangential: [lens(2), lens(3)],
         linear_fog,
-        sky_reach_px: plan.sky_reach_px() as f32,
+        sky_reach_px: plan.sky_reach_px as f32,
         planes,
         key_velocity_m_s: plan.key_twist.velocity_m_s.as_vec3().extend(0.0).to_array(),
         key_rate_rad_s: plan.key_twist.rate_rad_s.extend(plan.key_twist.rate_rad_s.length()).as_vec4().to_array(),

@@ -90,7 +90,7 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
         let depth = InverseDepthImage { size_px: ideal.size_px, values: &depth };
         let color = ColorImage { size_px: ideal.size_px, rgba: &color };
         let plane = plan.plane.seen_from(&plan.keys[0].pose);
-        assert_eq!(plan.sky_reach_px(), 2.0 * SKY_REACH_PX);
+        assert_eq!(plan.sky_reach_px, 2.0 * SKY_REACH_PX);
         // Where the twin looks, and what a plain read finds there: which kernel reads does not matter here.
         let source_px = |[x, y]: [u32; 2], sky_reach_px: f64| {
             let key = KeyView { ideal: &ideal, depth: &depth, plane, sky_reach_px };
@@ -102,7 +102,7 @@ fn kernels_find_skylines_as_their_twin_does_and_none_would_without_its_reach() {
         let (mut differ, mut squares) = (0, [0.0; 2]);
         for i in 0..SIZE_PX[0] * SIZE_PX[1] {
             let pixel = [i % SIZE_PX[0], i / SIZE_PX[0]];
-            let [with, without] = [plan.sky_reach_px(), 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
+            let [with, without] = [plan.sky_reach_px, 0.0].map(|reach_px| source_px(pixel, reach_px).expect("in view"));
             let of = |at_px: DVec2| color.sample(at_px).x;
             let [rendered, exact] = [&done.frame, &truth].map(|frame| f64::from(frame.color_rgba[4 * i as usize]));
             // Of a kernel that reads more sharply or more softly than the twin here: what is sky or wall all around is so for both.

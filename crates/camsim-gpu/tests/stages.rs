@@ -113,12 +113,8 @@ fn gather_as_its_twin(max_error_px: f64, hz: Option<f64>) -> BlurStage {
     let map = plan.camera.lens_inverse();
     let table = line_poses(plan, &sequence.path);
     let depth = InverseDepthImage { size_px: ideal.geometry.size_px, values: &ideal.depth };
-    let key = KeyView {
-        ideal: &ideal.geometry,
-        depth: &depth,
-        plane: plan.plane.seen_from(&plan.keys[0].pose),
-        sky_reach_px: plan.sky_reach_px(),
-    };
+    let key =
+        KeyView { ideal: &ideal.geometry, depth: &depth, plane: plan.plane.seen_from(&plan.keys[0].pose), sky_reach_px: plan.sky_reach_px };
     let color = ColorImage { size_px: ideal.geometry.size_px, rgba: &ideal.color };
     let coords = done.frame.coords.as_ref().expect("asked for");
     let depths = done.frame.depth_m.as_ref().expect("asked for");

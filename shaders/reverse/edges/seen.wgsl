@@ -12,14 +12,20 @@ fn seen_from(at_px: vec2<f32>, in_line: f32, in_key: f32) -> Seen {
     return Seen(reference_px(at_px, in_key), in_line, reference_point(at_px, in_key));
 }
 
-// Where one surface is around, the solution of the temporal inverse stands, on the very path that `gather` samples.
+// Where one surface is around, the solution of the temporal inverse stands, on the very path that `gather` samples; but the sky is where it is, whatever is beside it.
 fn smooth_px_at_phase(pixel: vec2<u32>, ray: Ray, phase: f32) -> vec2<f32> {
+    let reach_px = frame.sky_reach_px;
+    frame.sky_reach_px = 0.0;
     let at_px = source_at_phase(pixel, ray, phase).at_px;
+    frame.sky_reach_px = reach_px;
     return reference_px(at_px, inverse_depth(at_px));
 }
 
 fn smooth_mid(pixel: vec2<u32>, ray: Ray) -> Seen {
+    let reach_px = frame.sky_reach_px;
+    frame.sky_reach_px = 0.0;
     let mid = temporal_inverse_with_depth(ray.uv, pose_of_mid(pixel));
+    frame.sky_reach_px = reach_px;
     return seen_from(mid.at_px, mid.inverse_depth, inverse_depth(mid.at_px));
 }
 

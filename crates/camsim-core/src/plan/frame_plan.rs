@@ -11,7 +11,7 @@ use crate::{
     scenario::{Preset, QualitySpec},
     scene::LevelTolerance,
     shutter::Shutter,
-    temporal::{IdealGeometry, SKY_REACH_PX, TapStage, displacement::Twist},
+    temporal::{IdealGeometry, TapStage, displacement::Twist},
 };
 
 /// Part of the terrain's level of detail that models get: they are borders all over, of other colours than what is behind them.
@@ -96,6 +96,8 @@ pub struct FramePlan {
     pub samples_a_pixel: u32,
     /// What reads the ideal frame for each sample.
     pub taps: TapStage,
+    /// How far from a surface pixels of the sky go with it, pixels of the ideal frame: [`crate::temporal::SKY_REACH_PX`]. 0 where blended surfaces may stand before it, which are not of one colour.
+    pub sky_reach_px: f64,
     /// Fog after the gather (the paper's); otherwise it is in the ideal frame.
     pub linear_fog: Option<LinearFog>,
     /// Whether depth and coordinates are wanted beside the picture.
@@ -156,12 +158,6 @@ impl FramePlan {
             travel_m: self.motion.travel_m,
             parallax_px: MODEL_PARALLAX_SHARE * quality.max_error_px,
         }
-    }
-
-    /// How far from a surface pixels of the sky go with it, pixels of the ideal frame: [`SKY_REACH_PX`].
-    #[must_use]
-    pub fn sky_reach_px(&self) -> f64 {
-        SKY_REACH_PX * self.ideal.scale(&self.camera)
     }
 
     /// `[u_min, u_max, v_min, v_max]` of the ideal frame's pixel area.

@@ -20,7 +20,7 @@ use crate::{
     temporal::SKY_REACH_PX,
 };
 
-/// Times what is expected: of some places, between which a skyline is more rugged. With it 0.63 to 1.01 of what is foretold was found with groups of eight frames over an alpine valley.
+/// Times what is expected: of some places, between which a skyline is more rugged.
 const SAFETY: f64 = 1.5;
 /// The same of a ground that is drawn coarser than it is.
 const SAFETY_OF_GROUND: f64 = 1.2;
@@ -48,6 +48,8 @@ pub(super) struct Skyline {
     across_px: [f64; ACROSS],
     /// Of the camera.
     focal_px: DVec2,
+    /// [`SKY_REACH_PX`], or 0 where pixels of the sky go with nothing.
+    reach_px: f64,
 }
 
 /// A place of it.
@@ -67,11 +69,13 @@ struct Place {
     /// Squared contrast, of the linear range, and path over the exposure, pixels of the camera's focal length.
     contrast2: f64,
     path_px: f64,
+    /// How far it moves over the exposure before the sky.
+    swept_px: f64,
 }
 
 impl Place {
     /// Squared error that a pixel across the skyline has of its squared contrast, all such pixels together, in the frame of another camera.
-    fn wrong_px(&self, key_pose: &CameraPose, focal_px: DVec2, plane: &SeenPlane) -> f64 {
+    fn wrong_px(&self, key_pose: &CameraPose, focal_px: DVec2, plane: &SeenPlane, reach_px: f64) -> f64 {
         let (rotation, shift) = self.pose.relative_to(key_pose);
         let of_ray = rotation * self.uv.extend(1.0);
         let moved_px = |inverse_depth: f64| {
@@ -85,12 +89,20 @@ impl Place {
             // Straight out, and never found.
             None => (moved.length(), f64::INFINITY, 0.0),
         };
-        let wrong_px = wrong_px(moved_px, guess_px, taken_px);
+        // Looks after the first begin with what that found: with nothing, if it was the sky.
+        let wrong_px = [guess_px, 0.0].map(|guess_px| wrong_px(moved_px, guess_px, taken_px, reach_px)).into_iter().fold(0.0, f64::max);
         // From a camera that has it behind it: of all that it could be.
         if !wrong_px.is_finite() {
             return 1.0;
         }
-        wrong_px * self.spread(moved_px)
+        wrong_px * self.spread(moved_px) + self.missed_px(reach_px)
+    }
+
+    /// The same of pixels that the skyline only comes over before or after mid-exposure, when they look for it and find the sky alone: each lacks what it is covered for longer than at the reach,
+    /// `integral of ((swept / 2 - s) / swept)^2 ds` from there on.
+    fn missed_px(&self, reach_px: f64) -> f64 {
+        let beyond_px = (0.5 * self.swept_px - REACHED * reach_px).max(0.0);
+        if beyond_px > 0.0 { beyond_px.powi(3) / (3.0 * self.swept_px.powi(2)) } else { 0.0 }
     }
 
     /// Part that is left of what is so wide by the exposure, which spreads it over its path.
@@ -118,11 +130,11 @@ impl Place {
 /// Pixels across a skyline, each by the square of what it shows too much or too little of the surface, where that is moved towards the sky by so much, looked for where a guess of its depth has it, and what is
 /// beside it moved by so much.
 ///
-/// A pixel with its middle `s` beyond the skyline looks at `s + guess` first. If the surface is there, up to where it has moved, the pixel follows it and shows what it should. If it is within reach the pixel
+/// A pixel with its middle `s` beyond the skyline looks at `s + guess`. If the surface is there, up to where it has moved, the pixel follows it and shows what it should. If it is within reach the pixel
 /// moves as the surface there does, and finds the skyline moved by what that lacks. If not it follows the sky, which does not move, and shows what has come over it.
-fn wrong_px(moved_px: f64, guess_px: f64, taken_px: f64) -> f64 {
+fn wrong_px(moved_px: f64, guess_px: f64, taken_px: f64, reach_px: f64) -> f64 {
     let found_px = moved_px - guess_px;
-    let beyond_reach_px = found_px + REACHED * SKY_REACH_PX;
+    let beyond_reach_px = found_px + REACHED * reach_px;
     off_px(moved_px - taken_px, [found_px, beyond_reach_px]) + off_px(moved_px, [beyond_reach_px, f64::INFINITY])
 }
 
@@ -153,7 +165,7 @@ impl Skyline {
     /// Mean squared error over the picture, of the linear range, where the ideal frame is that of a camera elsewhere and look-ups of depth begin with a plane.
     pub fn strips(&self, key_pose: &CameraPose, plane: &SeenPlane) -> f64 {
         let of = |(times, place): &(f64, Place)| {
-            times * place.contrast2 * place.wrong_px(key_pose, self.focal_px, plane) / self.looked_px(place.normal).max(1.0)
+            times * place.contrast2 * place.wrong_px(key_pose, self.focal_px, plane, self.reach_px) / self.looked_px(place.normal).max(1.0)
         };
         SAFETY * SAFETY * self.found.iter().map(of).sum::<f64>()
     }
@@ -210,6 +222,7 @@ impl Search<'_> {
             found: places.into_iter().flatten().map(|place| (times, place)).collect(),
             across_px,
             focal_px: self.reach.camera.focal_px,
+            reach_px: if self.surfaces.blends() { 0.0 } else { SKY_REACH_PX },
         }
     }
 
@@ -233,6 +246,7 @@ impl Search<'_> {
             normal,
             ground: met.terrain.map(|hit| (hit, pose.position_ned_m + met.depth_m * way_ned(uv))),
             contrast2: (self.gain)(pixel).powi(2) * contrast.length_squared() / 3.0,
+            swept_px: self.swept_px(mid_s, uv, met.depth_m.recip(), normal),
             path_px: path_px(self.path, mid_s, self.shutter.exposure_s(), uv, met.depth_m.recip(), focal_px).0.length(),
         })
     }
@@ -259,6 +273,21 @@ impl Search<'_> {
         let across = (self.reach.camera.focal_px * (end(one)? - end(other)?)).perp().try_normalize()?;
         let towards_sky = self.reach.camera.focal_px * (uv_of_sky - self.reach.camera.unproject(at_px)?);
         Some(across * across.dot(towards_sky).signum())
+    }
+
+    /// How far something moves before the sky over the exposure, across the skyline where that is known: by where the camera goes.
+    fn swept_px(&self, mid_s: f64, uv: DVec2, inverse_depth: f64, normal: Option<DVec2>) -> f64 {
+        let half_s = 0.5 * self.shutter.exposure_s();
+        if half_s == 0.0 {
+            return 0.0;
+        }
+        let mid = self.path.pose(mid_s);
+        let moved = |t_s: f64| {
+            let shift = mid.relative_to(&self.path.pose(t_s)).1;
+            self.reach.camera.focal_px * inverse_depth * (shift.truncate() - shift.z * uv)
+        };
+        let swept = moved(mid_s + half_s) - moved(mid_s - half_s);
+        normal.map_or(swept.length(), |normal| normal.dot(swept).abs())
     }
 
     /// How near the surface is, as far behind the skyline as pixels of the sky look for it.
@@ -385,26 +414,26 @@ mod tests {
     fn pixels_that_find_the_surface_show_what_they_should() {
         for moved_px in [0.02, 0.2, 0.5, 1.0, -0.02, -0.2, -0.5, -0.8, -1.3] {
             // Looked for where it is, at once or beside it.
-            assert_eq!(wrong_px(moved_px, moved_px, moved_px), 0.0);
-            assert_eq!(wrong_px(moved_px, moved_px - REACHED * SKY_REACH_PX + 0.5, moved_px), 0.0);
-            assert_eq!(wrong_px(moved_px, f64::NEG_INFINITY, 0.0), 0.0);
+            assert_eq!(wrong_px(moved_px, moved_px, moved_px, SKY_REACH_PX), 0.0);
+            assert_eq!(wrong_px(moved_px, moved_px - REACHED * SKY_REACH_PX + 0.5, moved_px, SKY_REACH_PX), 0.0);
+            assert_eq!(wrong_px(moved_px, f64::NEG_INFINITY, 0.0, SKY_REACH_PX), 0.0);
             // What is beside it may move less: by nothing as the sky, by a little more or less than half.
             for part in [0.0, 0.5] {
-                let found = wrong_px(moved_px, moved_px, part * moved_px);
+                let found = wrong_px(moved_px, moved_px, part * moved_px, SKY_REACH_PX);
                 assert!((found / exactly((1.0 - part) * moved_px) - 1.0).abs() < 0.05, "{moved_px} {part}: {found}");
             }
             // Whoever finds the sky only sees all of it.
-            let of_all = wrong_px(moved_px, f64::INFINITY, moved_px) / all_of(moved_px.abs());
+            let of_all = wrong_px(moved_px, f64::INFINITY, moved_px, SKY_REACH_PX) / all_of(moved_px.abs());
             assert!((of_all - 1.0).abs() < 0.05, "{moved_px}: {of_all}");
             // A guess that is far too near finds the sky where the surface has come over it, and the surface where that has gone.
-            let too_near = wrong_px(moved_px, 300.0 * moved_px, moved_px);
+            let too_near = wrong_px(moved_px, 300.0 * moved_px, moved_px, SKY_REACH_PX);
             assert!(if moved_px > 0.0 { too_near > 0.0 } else { too_near == 0.0 }, "{moved_px}: {too_near}");
         }
         // Beyond the reach: shown where it is not from there on, and not shown where it is up to there.
         for moved_px in [3.0, 5.0] {
-            let over = wrong_px(moved_px, moved_px, moved_px);
+            let over = wrong_px(moved_px, moved_px, moved_px, SKY_REACH_PX);
             assert!((over - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * over, "{moved_px}: {over}");
-            let gone = wrong_px(-moved_px, 0.0, -moved_px);
+            let gone = wrong_px(-moved_px, 0.0, -moved_px, SKY_REACH_PX);
             assert!((gone - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * gone, "{moved_px}: {gone}");
         }
     }

@@ -37,7 +37,7 @@ fn by_twins(sequence: &Sequence, plan: &FramePlan, fault: Fault) -> RenderedFram
 
     let [width, height] = camera.size_px;
     let mut coords = Vec::new();
-    let key = KeyView { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px() };
+    let key = KeyView { ideal: &plan.ideal, depth: &depth, plane: DVec3::ZERO, sky_reach_px: plan.sky_reach_px };
     let mut color_rgba = Vec::new();
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         let mut dt_s = plan.shutter.dt_pixel_s(x, y);

@@ -28,7 +28,7 @@ mod rays;
 mod source;
 mod truth;
 
-use crate::host::lanes::{LANES, each};
+use crate::host::lanes::{LANES, ZERO, each};
 #[cfg(target_arch = "x86_64")]
 use crate::host::vectors::Avx2;
 use crate::host::vectors::{Vectors, widest};
@@ -234,12 +234,19 @@ impl Reads<'_> {
         if let Some(mid) = self.poses_of(y).last().filter(|_| is_asked.iter().any(|&asked| asked > 0.0)) {
             let sides = || rays::sides(self.frame, self.map, x, y);
             let area = Footprint::new(self.cells, self.tap, sides, self.frame.max_taps);
-            let gathered = self.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, &wanted);
-            colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
-            // What is black whatever it shows is not looked for.
-            inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
-            if self.tells_truth {
-                self.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
+            // Where the sky is does not depend on what is beside it.
+            let frame = self.tells_truth.then(|| FrameUniforms { sky_reach_px: 0.0, ..*self.frame });
+            let exact = frame.as_ref().map(|frame| Reads { frame, ..*self });
+            for (reads, wanted) in [(Some(self), &wanted), (exact.as_ref(), &ZERO)] {
+                let Some(reads) = reads else { continue };
+                let gathered = reads.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, wanted);
+                if exact.as_ref().is_some_and(|exact| std::ptr::eq(exact, reads)) {
+                    reads.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
+                    continue;
+                }
+                colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
+                // What is black whatever it shows is not looked for.
+                inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
             }
         }
         if inside.iter().all(|&inside| inside == 0.0) {

@@ -8,7 +8,13 @@ use serde_json::Value;
 use super::GltfError;
 
 /// Extensions that a file may require: what they add is done here, or by the glTF crate.
-const DONE: &[&str] = &["KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_texture_transform", "KHR_materials_unlit"];
+const DONE: &[&str] = &[
+    "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
+    "KHR_texture_transform",
+    "KHR_materials_unlit",
+    "KHR_materials_pbrSpecularGlossiness",
+];
 /// Extensions that only change light and shade, which are not shown.
 const NO_MATTER: &[&str] = &["KHR_materials_", "KHR_lights_punctual", "KHR_animation_pointer"];
 /// Places that are told of; what is wrong in one is often wrong in all.
