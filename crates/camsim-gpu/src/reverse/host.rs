@@ -135,7 +135,8 @@ struct Reads<'a> {
     poses: &'a [Pose],
     /// Pose of the key camera in the mid-window camera, if it is another one and somebody asks.
     elsewhere: Option<Pose>,
-    tells_truth: bool,
+    /// The same numbers for depth and coordinates, where they are told: where the sky is does not depend on what is beside it.
+    frame_of_truth: Option<&'a FrameUniforms>,
     /// The first pixel's place in the ideal frame, where pixels are those.
     copied_from: Option<[u32; 2]>,
     segments: &'a [[f32; 2]],
@@ -156,8 +157,10 @@ impl HostKernel {
         let tells_truth = key.truth && !plan.looks_for_itself();
         let HostInputs { frame, poses, map, vignette, ideal } = *inputs;
         let [width, height] = frame.size_px.map(|side| side as usize);
+        let frame_of_truth = FrameUniforms { sky_reach_px: 0.0, ..*frame };
         let reads = Reads {
             frame,
+            frame_of_truth: Some(&frame_of_truth).filter(|_| tells_truth),
             ideal,
             temporal: key.temporal,
             blur: plan.blur,
@@ -166,7 +169,6 @@ impl HostKernel {
             vignette,
             poses,
             elsewhere: poses.get(height * poses_a_line(frame)).copied().filter(|_| key.keys == KeyKind::Elsewhere),
-            tells_truth,
             copied_from: plan.copied_from(),
             segments: &self.segments,
             cells: &self.cells,
@@ -204,7 +206,7 @@ impl Reads<'_> {
 
     #[inline(always)]
     fn rows_by(&self, vectors: impl Vectors, first: u32, rows: &mut [f32], truth: &mut [Truth]) {
-        if let Some(from) = self.copied_from.filter(|_| !self.tells_truth) {
+        if let Some(from) = self.copied_from.filter(|_| self.frame_of_truth.is_none()) {
             return self.copied_rows(vectors, from, first, rows);
         }
         let width = self.frame.size_px[0] as usize;
@@ -212,7 +214,7 @@ impl Reads<'_> {
         for x in (0..width).step_by(LANES) {
             let end = width.min(x + LANES);
             for (number, row) in rows.chunks_exact_mut(4 * width).enumerate() {
-                let truth = if self.tells_truth { &mut truth[number * width..][x..end] } else { &mut [] };
+                let truth = if self.frame_of_truth.is_some() { &mut truth[number * width..][x..end] } else { &mut [] };
                 self.block(vectors, [x as u32, first + number as u32], &mut row[4 * x..4 * end], truth);
             }
         }
@@ -230,23 +232,22 @@ impl Reads<'_> {
         let weight = self.weights(x, y);
         let wanted = each(|i| if weight[i] > 0.0 { rays.valid[i] } else { 0.0 });
         let (mut colors, mut inside) = ([[0.0; 4]; LANES], rays.valid);
-        let is_asked = if self.tells_truth { &rays.valid } else { &wanted };
+        let is_asked = if self.frame_of_truth.is_some() { &rays.valid } else { &wanted };
         if let Some(mid) = self.poses_of(y).last().filter(|_| is_asked.iter().any(|&asked| asked > 0.0)) {
             let sides = || rays::sides(self.frame, self.map, x, y);
             let area = Footprint::new(self.cells, self.tap, sides, self.frame.max_taps);
-            // Where the sky is does not depend on what is beside it.
-            let frame = self.tells_truth.then(|| FrameUniforms { sky_reach_px: 0.0, ..*self.frame });
-            let exact = frame.as_ref().map(|frame| Reads { frame, ..*self });
-            for (reads, wanted) in [(Some(self), &wanted), (exact.as_ref(), &ZERO)] {
-                let Some(reads) = reads else { continue };
-                let gathered = reads.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, wanted);
-                if exact.as_ref().is_some_and(|exact| std::ptr::eq(exact, reads)) {
+            // The picture first, then the truth about it: one place in the code, where all of this is written out.
+            for (frame, is_truth) in [(Some(self.frame), false), (self.frame_of_truth, true)] {
+                let Some(frame) = frame else { continue };
+                let reads = Reads { frame, ..*self };
+                let gathered = reads.gather(vectors, &rays.uv, &area, self.poses_of(y), mid, if is_truth { &ZERO } else { &wanted });
+                if is_truth {
                     reads.truth(&rays.uv, mid, &gathered.at_phase_px, &inside, truth);
-                    continue;
+                } else {
+                    colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
+                    // What is black whatever it shows is not looked for.
+                    inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
                 }
-                colors = self.copied_from.map_or(gathered.color, |from| self.copied(vectors, from, [x, y]));
-                // What is black whatever it shows is not looked for.
-                inside = each(|i| if weight[i] > 0.0 { rays.valid[i] * gathered.inside[i] } else { rays.valid[i] });
             }
         }
         if inside.iter().all(|&inside| inside == 0.0) {

@@ -132,11 +132,11 @@ impl Reads<'_> {
             self.add_mean(vectors, &curve, &count, area, &taken, &mut sum);
             taken = each(|i| taken[i] + samples[i]);
             source = curve.end;
-            if self.tells_truth && stretch == (gone as u32).min(stretches - 1) {
+            if self.frame_of_truth.is_some() && stretch == (gone as u32).min(stretches - 1) {
                 at_phase_px = curve.along(&[(gone - stretch as f32) * steps as f32; LANES]);
             }
         }
-        if self.tells_truth && self.frame.coords_phase == 0.0 {
+        if self.frame_of_truth.is_some() && self.frame.coords_phase == 0.0 {
             at_phase_px = self.solve(uv, mid).at_px;
         }
         for part in sum.as_flattened_mut() {
