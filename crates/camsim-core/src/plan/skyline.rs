@@ -378,7 +378,8 @@ mod tests {
         // edges of the picture there are fewer lines. Over an exposure these move by as much as they are displaced in as long.
         for (key_s, exposure_ms) in [(0.005, 0.0), (0.05, 0.0), (0.1, 0.0), (0.1, 20.0)] {
             let [width_px, path_px] = [key_s, 1e-3 * exposure_ms].map(|s| FOCAL_PX * SPEED_M_S * s / 100.0);
-            let wrong_px = all_of(width_px) * width_px.max(1.0) / (width_px.max(1.0) + path_px);
+            // The border on the other side has gone, and later looks, which begin with nothing, find that up to the reach.
+            let wrong_px = (all_of(width_px) + gone(width_px)) * width_px.max(1.0) / (width_px.max(1.0) + path_px);
             for by_halves in [false, true] {
                 let sides_px = [150.0, 171.0, 190.0, 203.0, 222.0, 240.0, 261.0];
                 let ratios = sides_px.map(|side_px| {
@@ -391,6 +392,11 @@ mod tests {
                 assert!(ratios.iter().all(|ratio| (0.8..1.7).contains(ratio)), "{key_s} s, {width_px} px: {ratios:?}");
             }
         }
+    }
+
+    /// Of those beyond the reach where a surface has gone by so much.
+    fn gone(moved_px: f64) -> f64 {
+        (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0).max(0.0)
     }
 
     /// Of all pixels, in closed form.
@@ -432,9 +438,9 @@ mod tests {
         // Beyond the reach: shown where it is not from there on, and not shown where it is up to there.
         for moved_px in [3.0, 5.0] {
             let over = wrong_px(moved_px, moved_px, moved_px, SKY_REACH_PX);
-            assert!((over - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * over, "{moved_px}: {over}");
-            let gone = wrong_px(-moved_px, 0.0, -moved_px, SKY_REACH_PX);
-            assert!((gone - (moved_px - REACHED * SKY_REACH_PX - 0.5 + 1.0 / 3.0)).abs() < 0.05 * gone, "{moved_px}: {gone}");
+            assert!((over - gone(moved_px)).abs() < 0.05 * over, "{moved_px}: {over}");
+            let found = wrong_px(-moved_px, 0.0, -moved_px, SKY_REACH_PX);
+            assert!((found - gone(moved_px)).abs() < 0.05 * found, "{moved_px}: {found}");
         }
     }
 
@@ -442,6 +448,11 @@ mod tests {
     fn skylines_cost_by_what_the_camera_makes_of_them_and_nothing_from_the_same_place() {
         assert_eq!(found(BOARD, 0.0), 0.0);
         assert!((found(Board { gain: 0.5, ..BOARD }, 0.05) / found(BOARD, 0.05) - 0.25).abs() < 1e-12);
+        // But for what an exposure of 8 px sweeps from beyond the reach, across two of four borders.
+        let of_each = (4.0 - REACHED * SKY_REACH_PX).powi(3) / (3.0 * 64.0);
+        let expected = SAFETY * SAFETY * 200.0 * 2.0 * of_each / 120_000.0;
+        let swept = found(Board { exposure_ms: 100.0, ..BOARD }, 0.0);
+        assert!((0.8..1.4).contains(&(swept / expected)), "{swept} {expected}");
     }
 
     #[test]
@@ -450,7 +461,9 @@ mod tests {
         let mut pane = Mesh::level_picture(grey, DVec3::new(9000.0, 0.0, -50.0), 10.0);
         pane.material.blends = true;
         let (with, without) = (found(Board { others: vec![pane], ..BOARD }, 0.05), found(BOARD, 0.05));
-        assert!(without > 0.0 && (with / without - 1.0).abs() < 1e-9, "{with} {without}");
+        // With a pane nothing goes with a surface: both borders are wrong from end to end.
+        let expected = 2.0 * all_of(4.0) / (all_of(4.0) + gone(4.0));
+        assert!(without > 0.0 && (with / without / expected - 1.0).abs() < 0.05, "{with} {without} {expected}");
     }
 
     /// A crest whose every other height is 3 m lower, 1500 m to the north and 30 m above the camera: where coarser triangles leave the lower heights out it is drawn 1.5 m higher there in the mean, 1 px at
