@@ -117,7 +117,7 @@ pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> 
 pub const SKY_REACH_PX: f64 = 2.0;
 
 /// Where a surface is looked for around a place that shows the sky.
-pub(crate) const SKY_DIRECTIONS: [DVec2; 8] = {
+const SKY_DIRECTIONS: [DVec2; 8] = {
     const SIDE: f64 = std::f64::consts::FRAC_1_SQRT_2;
     [
         DVec2::new(1.0, 0.0),
