@@ -27,6 +27,7 @@ mod meshes;
 mod paint;
 mod ray;
 mod render;
+mod truth;
 
 use clock::Clock;
 use eye::Eye;
@@ -37,6 +38,7 @@ use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;
 pub use render::{Convergence, KeyFrame, RenderOptions};
+pub use truth::{DEPTH_TOLERANCE, TruthErrors, truth_errors};
 
 /// Zoomed lenses that are kept: as many as frames may be looked at in turn.
 const ZOOMED_KEPT: usize = 4;

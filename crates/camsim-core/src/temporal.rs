@@ -16,6 +16,7 @@ pub mod marks;
 pub mod paper;
 pub mod path;
 mod samples;
+pub mod suspects;
 
 pub(crate) use footprint::TENT_PX2;
 pub use footprint::{Footprint, Kernel, TapStage, WIDEST_AREA_PX, tap_shares};

@@ -30,6 +30,7 @@ use camsim_core::{
 mod ahead;
 mod drawn;
 mod error;
+mod exact_truth;
 mod finished;
 mod inspect;
 mod on_host;

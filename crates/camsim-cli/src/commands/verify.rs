@@ -5,7 +5,10 @@ use std::convert::Infallible;
 use anyhow::anyhow;
 use camsim_core::{
     plan::{FramePlan, Predicted},
-    reference::{CoordErrors, ErrorStats, Holes, Judged, KeyFrame, Oracle, RenderOptions, coord_errors, holes, image_errors, silhouettes},
+    reference::{
+        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, Judged, KeyFrame, Oracle, RenderOptions, TruthErrors, coord_errors, holes,
+        image_errors, silhouettes, truth_errors,
+    },
     scenario::{Auto, Channel, Solver},
 };
 use camsim_gpu::{
@@ -35,6 +38,9 @@ const DEFAULT_FRAMES: u64 = 5;
 ///
 /// The terrain is drawn coarser than it is, by up to quality.max_terrain_error_px. The bound on that stands in a column of its own: the measured
 /// errors of sources hold only what it does to parallax. What it does to the picture is in the predicted error of that and measured by --pictures.
+///
+/// Depth and points (north, east, down) of every pixel, at silhouettes too, are compared with the surface that the pixel's own ray meets. A depth or point that is off by more than
+/// 0.1 % of the depth, and that no surface within quality.max_error_px of the pixel's centre has, is a fault: one is enough for exit code 1.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -70,6 +76,8 @@ struct Verified {
     frame: u64,
     predicted: Predicted,
     measured: Measured,
+    /// Depths and points of all pixels; `None` where the solver tells where it looks and not what is there.
+    truth: Option<Truth>,
     /// The terrain as drawn.
     level_of_detail: Option<LevelOfDetail>,
     /// Whether the 99th percentile that the frame is judged by is within the tolerance, and within the prediction.
@@ -93,6 +101,37 @@ struct Measured {
     missing: u64,
     /// Share of the picture that shows what no ideal frame sees.
     hole_share: f64,
+}
+
+/// Errors are shares of the depth; `null` where a surface is told for the sky or the sky for a surface.
+#[derive(Serialize)]
+struct Truth {
+    /// Whether every depth and point belongs to a surface that the pixel may see.
+    kept: bool,
+    pixels: u64,
+    /// Depths off by more than 0.1 %, and those among them that no surface near the pixel has.
+    depth_beyond: u64,
+    depth_faults: u64,
+    depth_max: Option<f64>,
+    points_beyond: u64,
+    point_faults: u64,
+    point_max: Option<f64>,
+}
+
+impl From<TruthErrors> for Truth {
+    fn from(errors: TruthErrors) -> Self {
+        let finite = |error: f64| error.is_finite().then_some(error);
+        Self {
+            kept: errors.kept(),
+            pixels: errors.pixels,
+            depth_beyond: errors.depth_beyond,
+            depth_faults: errors.depth_faults,
+            depth_max: finite(errors.depth_max),
+            points_beyond: errors.points_beyond,
+            point_faults: errors.point_faults,
+            point_max: finite(errors.point_max),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -156,7 +195,9 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     for &frame in &frames {
         let verified = verify(frame, &mut session, &oracle, tolerance_px, args.pictures)?;
-        report.kept &= verified.kept && verified.picture.as_ref().is_none_or(|picture| picture.kept);
+        report.kept &= verified.kept
+            && verified.picture.as_ref().is_none_or(|picture| picture.kept)
+            && verified.truth.as_ref().is_none_or(|truth| truth.kept);
         if !args.json {
             print(&verified, tolerance_dn, console)?;
         }
@@ -172,6 +213,13 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         let broken: Vec<String> = report.frames.iter().filter(|frame| is_broken(frame)).map(|frame| frame.frame.to_string()).collect();
         broken.join(", ")
     };
+    let of_truth = |frame: &Verified| frame.truth.as_ref().is_some_and(|truth| !truth.kept);
+    if report.frames.iter().all(|frame| frame.kept) && report.frames.iter().any(of_truth) {
+        let frames = frames_where(&of_truth);
+        return Err(Failure::failed(anyhow!(
+            "depths or points of frame {frames} belong to no surface within {tolerance_px} px of their pixel"
+        )));
+    }
     let Some(first) = report.frames.iter().find(|frame| !frame.kept) else {
         let frames = frames_where(&|frame| frame.picture.as_ref().is_some_and(|picture| !picture.kept));
         return Err(Failure::failed(anyhow!("quality.max_error_dn = {tolerance_dn} is broken in frame {frames}")));
@@ -228,10 +276,13 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     let p99_px = judged.p99_px();
     let picture = pictures.then(|| picture(oracle, &first));
     let hole_share = unseen(oracle, &first.plan).share();
+    let is_exact = first.plan.tells_exact_truth();
+    let truth = truth_errors(oracle, &first.plan, &first.frame, tolerance_px).filter(|_| is_exact).map(Truth::from);
     Ok(Verified {
         frame,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
         kept: p99_px <= tolerance_px,
+        truth,
         as_predicted: p99_px <= first.plan.predicted.total_px,
         not_in_the_picture: first.plan.not_in_the_picture(),
         predicted: first.plan.predicted,
@@ -340,6 +391,9 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         "       | holes, hidden from every ideal frame: {expected}, measured {:.4} % of the picture",
         100.0 * hole_share
     ))?;
+    if let Some(truth) = &verified.truth {
+        console.line(format_args!("       | {}", describe_truth(truth)))?;
+    }
     if let Some(Picture { rms_dn, predicted_dn, kept, psnr_db, smooth_psnr_db, silhouettes_psnr_db, max }) = &verified.picture {
         let db = |db: &Option<f64>| db.map_or_else(|| "-".to_owned(), |db| format!("{db:.2} dB"));
         let (all, smooth, silhouettes) = (db(psnr_db), db(smooth_psnr_db), db(silhouettes_psnr_db));
@@ -360,6 +414,18 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
         }
     }
     Ok(())
+}
+
+fn describe_truth(truth: &Truth) -> String {
+    let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } = truth;
+    let largest = |error: &Option<f64>| error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.2e} %", 100.0 * error));
+    let percent = 100.0 * DEPTH_TOLERANCE;
+    format!(
+        "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); of no surface near the pixel: {depth_faults} and {point_faults}: {}",
+        largest(depth_max),
+        largest(point_max),
+        if *kept { "kept" } else { "BROKEN" }
+    )
 }
 
 /// The tolerance and the prediction are kept or broken each by itself.

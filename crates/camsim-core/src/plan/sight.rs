@@ -20,12 +20,18 @@ pub struct Sight {
 }
 
 impl FramePlan {
+    /// Whether depth and coordinates are wanted, and tell what pixels truly see: where their look-up in the ideal frame may be wrong, rays decide
+    /// ([`crate::temporal::suspects`]). The paper's solvers tell where they look instead.
+    #[must_use]
+    pub fn tells_exact_truth(&self) -> bool {
+        self.truth && !matches!(self.temporal, TemporalStage::Linear | TemporalStage::Rk2)
+    }
+
     /// Whether depth and coordinates of pixels at silhouettes come from rays of their own ([`Planner::sight`]): where they are wanted, silhouettes may
     /// be in view, and the solver looks where the point truly is. The paper's solvers do not, and their coordinates tell where they look.
     #[must_use]
     pub fn looks_for_itself(&self) -> bool {
-        let exact = !matches!(self.temporal, TemporalStage::Linear | TemporalStage::Rk2);
-        self.truth && exact && self.edges != EdgeStage::None
+        self.tells_exact_truth() && self.edges != EdgeStage::None
     }
 }
 

@@ -7,8 +7,8 @@ use camsim_core::{frame::RenderedFrame, plan::FramePlan, scene::LodSelection};
 use super::{
     InFlight, Session,
     ahead::Lines,
-    ms_since,
-    readback::{Output, coords, look_for_unknown, read_mapped},
+    exact_truth, ms_since,
+    readback::{Output, coords, read_mapped},
 };
 use crate::{context::GpuError, layout::Truth, recorder::PassTime};
 
@@ -73,8 +73,8 @@ impl Session<'_> {
             Some(made) => made,
             None => (slot.color.read()?, from_device()?),
         };
-        if let Some(truth) = truth.as_mut().filter(|_| plan.looks_for_itself()) {
-            look_for_unknown(truth, &self.planner, &plan, f64::from(self.coords_phase));
+        if let Some(truth) = truth.as_mut().filter(|_| plan.tells_exact_truth()) {
+            exact_truth::complete(truth, &color_rgba, &self.planner, &plan, f64::from(self.coords_phase));
         }
         let size_px = plan.camera.size_px;
         let frame = RenderedFrame {

@@ -6,9 +6,7 @@ use std::{
     thread::{Builder, available_parallelism},
 };
 
-use camsim_core::plan::{FramePlan, Planner};
-use glam::DVec2;
-use rayon::prelude::*;
+use camsim_core::plan::FramePlan;
 
 use crate::{
     context::{GpuContext, GpuError},
@@ -80,21 +78,6 @@ fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
         work();
     });
     values
-}
-
-/// Casts the rays that the shader left to the host: those of pixels that may see a silhouette. `phase` is that of the coordinates.
-pub(super) fn look_for_unknown(truth: &mut [Truth], planner: &Planner, plan: &FramePlan, phase: f64) {
-    let width = plan.camera.size_px[0];
-    let of_rows = truth.par_chunks_mut(width as usize).zip(0_u32..u32::MAX);
-    of_rows.for_each(|(row, y)| {
-        for (unknown, x) in row.iter_mut().zip(0..).filter(|(t, _)| t.depth_m < 0.0) {
-            let uv = DVec2::new(f64::from(unknown.uv[0]), f64::from(unknown.uv[1]));
-            let sight = planner.sight(plan, [x, y], uv, phase);
-            unknown.source_px = sight.source_px.as_vec2().to_array();
-            unknown.point_ned_m = sight.met.map_or([0.0; 3], |(point_ned_m, _)| point_ned_m.as_vec3().to_array());
-            unknown.depth_m = sight.met.map_or(0.0, |(_, depth_m)| depth_m as f32);
-        }
-    });
 }
 
 /// What the shader wrote beside the picture, with each pixel's time shift.

@@ -1,0 +1,145 @@
+//! Pixels of an output frame whose depth, looked up in an ideal frame, may belong to no surface or to the wrong one.
+//!
+//! On a plane inverse depth is affine in the picture, so its second difference along a line of pixels is zero, and on a smooth surface it is small. A look-up between
+//! texels of an ideal frame is wrong only across a crease or an edge, by at most a quarter of the second difference there (the error of linear
+//! interpolation at a kink, at its worst in the middle between two texels). A region that shows the wrong surface altogether ends at an edge of what was looked up or of what is
+//! truly there: from its border on, each pixel that a ray corrects makes its neighbours suspect.
+
+use rayon::prelude::*;
+
+/// Second difference of inverse depth, relative to the largest of the three, from which a ray decides: what is looked up then errs by at most 1e-4.
+pub const BEND: f32 = 4e-4;
+/// Relative change of inverse depth by a ray from which the pixels around it are suspect too.
+pub const CHANGE: f32 = 4e-4;
+
+/// Inverse depths of a frame's pixels (1/m, 0 = nothing), row-major, and which of them have a ray through the lens.
+#[derive(Clone, Copy, Debug)]
+pub struct DepthGrid<'a> {
+    /// Pixels of a row.
+    pub width: usize,
+    /// From a row to the next of the same field: 2 where fields are interlaced.
+    pub row_step: usize,
+    /// Inverse planar depths, 1/m.
+    pub inverse_depth: &'a [f32],
+    /// Whether a pixel is valid.
+    pub valid: &'a [bool],
+}
+
+/// Whether inverse depth bends more between three pixels in a line than on a smooth surface. Sky beside a surface does.
+#[must_use]
+pub fn bends(before: f32, here: f32, after: f32) -> bool {
+    (before - 2.0 * here + after).abs() > BEND * before.max(here).max(after)
+}
+
+/// Whether a ray has found something else than was looked up.
+#[must_use]
+pub fn changed(looked_up: f32, by_ray: f32) -> bool {
+    (looked_up - by_ray).abs() > CHANGE * looked_up.max(by_ray)
+}
+
+impl DepthGrid<'_> {
+    /// Pixels at which inverse depth bends, and their neighbours, row-major.
+    #[must_use]
+    pub fn suspects(&self) -> Vec<bool> {
+        let mut bent = vec![false; self.inverse_depth.len()];
+        bent.par_chunks_mut(self.width).enumerate().for_each(|(y, row)| self.bends_of_row(y, row));
+        let mut suspects = vec![false; bent.len()];
+        suspects.par_chunks_mut(self.width).enumerate().for_each(|(y, row)| {
+            for above in self.rows_around(y) {
+                let bent = &bent[above * self.width..][..self.width];
+                for x in 0..self.width {
+                    row[x] |= bent[x] | bent[x.saturating_sub(1)] | bent[(x + 1).min(self.width - 1)];
+                }
+            }
+        });
+        suspects.iter_mut().zip(self.valid).for_each(|(suspect, valid)| *suspect &= valid);
+        suspects
+    }
+
+    /// The pixels beside and diagonally beside one, of the same field.
+    pub fn neighbours(&self, pixel: usize) -> impl Iterator<Item = usize> + '_ {
+        let (x, y) = (pixel % self.width, pixel / self.width);
+        let columns = x.saturating_sub(1)..=(x + 1).min(self.width - 1);
+        self.rows_around(y).flat_map(move |row| columns.clone().map(move |column| row * self.width + column))
+    }
+
+    /// A row, and those above and below it in its field.
+    fn rows_around(&self, y: usize) -> impl Iterator<Item = usize> + use<> {
+        let (height, step) = (self.inverse_depth.len() / self.width, self.row_step);
+        let below = Some(y + step).filter(|&row| row < height);
+        [y.checked_sub(step), Some(y), below].into_iter().flatten()
+    }
+
+    fn bends_of_row(&self, y: usize, bent: &mut [bool]) {
+        let (width, here) = (self.width, y * self.width);
+        let row = &self.inverse_depth[here..here + width];
+        let valid = &self.valid[here..here + width];
+        for x in 1..width.saturating_sub(1) {
+            bent[x] |= bends(row[x - 1], row[x], row[x + 1]) & valid[x - 1] & valid[x] & valid[x + 1];
+        }
+        let stride = self.row_step * width;
+        if here < stride || here + stride + width > self.inverse_depth.len() {
+            return;
+        }
+        let (above, below) = (&self.inverse_depth[here - stride..][..width], &self.inverse_depth[here + stride..][..width]);
+        let (valid_above, valid_below) = (&self.valid[here - stride..][..width], &self.valid[here + stride..][..width]);
+        for x in 0..width {
+            bent[x] |= bends(above[x], row[x], below[x]) & valid_above[x] & valid[x] & valid_below[x];
+        }
+        for x in 1..width.saturating_sub(1) {
+            bent[x] |= bends(above[x - 1], row[x], below[x + 1]) & valid_above[x - 1] & valid[x] & valid_below[x + 1];
+            bent[x] |= bends(above[x + 1], row[x], below[x - 1]) & valid_above[x + 1] & valid[x] & valid_below[x - 1];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Suspects of a grid of 12 x 10 pixels, from inverse depths by place.
+    fn suspects(row_step: usize, valid: impl Fn(usize, usize) -> bool, look: impl Fn(f32, f32) -> f32) -> Vec<[usize; 2]> {
+        let places = || (0..10).flat_map(|y| (0..12).map(move |x| [x, y]));
+        let inverse_depth: Vec<f32> = places().map(|[x, y]| look(x as f32, y as f32)).collect();
+        let valid: Vec<bool> = places().map(|[x, y]| valid(x, y)).collect();
+        let grid = DepthGrid { width: 12, row_step, inverse_depth: &inverse_depth, valid: &valid };
+        places().zip(grid.suspects()).filter(|(_, suspect)| *suspect).map(|(at, _)| at).collect()
+    }
+
+    #[test]
+    fn planes_and_the_sky_have_no_suspects() {
+        assert!(suspects(1, |_, _| true, |x, y| 0.01 + 0.002 * x + 0.003 * y).is_empty());
+        assert!(suspects(1, |_, _| true, |_, _| 0.0).is_empty());
+        // A step between the fields of an interlaced frame is none: they are of other instants.
+        assert!(suspects(2, |_, _| true, |_, y| if y as u32 % 2 == 0 { 0.01 } else { 0.02 }).is_empty());
+    }
+
+    #[test]
+    fn edges_creases_and_skylines_are_suspect_with_their_neighbours() {
+        let column = |found: Vec<[usize; 2]>| found.iter().filter(|at| at[1] == 5).map(|at| at[0]).collect::<Vec<_>>();
+        assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.02 })), [3, 4, 5, 6]);
+        assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.0 })), [3, 4, 5, 6]);
+        assert_eq!(column(suspects(1, |_, _| true, |x, _| 0.1 + 1e-4 * (x - 5.0).max(0.0))), [4, 5, 6]);
+        assert!(suspects(1, |_, _| true, |x, _| 0.1 + 1e-5 * (x - 5.0).max(0.0)).is_empty());
+        // At the border of the picture too.
+        assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 1.0 { 0.1 } else { 0.02 })), [0, 1, 2]);
+    }
+
+    #[test]
+    fn what_has_no_ray_is_not_suspect_and_makes_nothing_suspect() {
+        assert!(suspects(1, |x, _| x >= 5, |x, _| if x < 5.0 { 0.0 } else { 0.02 }).is_empty());
+    }
+
+    #[test]
+    fn neighbours_stay_in_the_picture_and_in_the_field() {
+        let (inverse_depth, valid) = ([0.0; 120], [true; 120]);
+        let grid = DepthGrid { width: 12, row_step: 2, inverse_depth: &inverse_depth, valid: &valid };
+        assert_eq!(grid.neighbours(0).collect::<Vec<_>>(), [0, 1, 24, 25]);
+        assert_eq!(grid.neighbours(119).collect::<Vec<_>>(), [94, 95, 118, 119]);
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_no_bend() {
+        assert!(!bends(f32::NAN, 0.1, 0.1) && !changed(f32::NAN, 0.1) && changed(0.0, 0.1) && !changed(0.0, 0.0));
+    }
+}
