@@ -268,7 +268,6 @@ impl Planner {
                 plain: picture.silhouettes.as_ref().filter(|_| picture.is_plain),
                 fine: picture.fine,
                 rays: picture.rays,
-                truth: self.truth,
             };
             let edges = edges::edge_stage(&case, &mut skipped);
             (exposure, exposure.map(|exposure| look.blur_stage(exposure, edges, &sampling, motion, &ideal)), edges)

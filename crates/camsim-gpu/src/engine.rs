@@ -43,7 +43,6 @@ use ahead::{Ahead, Lines, Prepared, Preparer};
 use drawn::Drawn;
 pub use error::RenderError;
 pub(crate) use error::RenderErrorBase;
-use finished::reverses_on_device;
 pub use finished::{Finished, FrameTimes};
 pub use inspect::IdealImages;
 use on_host::{HostFrame, OnHost};
@@ -302,7 +301,7 @@ impl Session<'_> {
         let begun = Instant::now();
         let submission = gpu.queue.submit([commands]);
         let submit_ms = ms_since(begun);
-        self.slots[slot].recall(on_host.is_none(), reverses_on_device(&prepared.plan, on_host.as_ref()));
+        self.slots[slot].recall(on_host.is_none());
         self.on_host.iter_mut().for_each(OnHost::recall);
         self.engine.check()?;
         let (lod, out_of_order) = self.drawn.as_ref().map(|drawn| (drawn.lod, drawn.out_of_order)).unwrap_or_default();
@@ -325,10 +324,10 @@ impl Session<'_> {
         }
         self.ideal(&mut recorder, prepared, slot)?;
         let on_host = self.bring_to_host(&mut recorder, &prepared.plan);
-        if reverses_on_device(&prepared.plan, on_host.as_ref()) {
+        if on_host.is_none() {
             self.reverse(&mut recorder, prepared, slot)?;
             let slot = &self.slots[slot];
-            for output in on_host.is_none().then_some(&slot.color).into_iter().chain(&slot.truth) {
+            for output in std::iter::once(&slot.color).chain(&slot.truth) {
                 output.copy(recorder.encoder());
             }
         }

@@ -242,8 +242,6 @@ fn the_host_makes_the_same_picture() {
         assert_eq!(plan.taps, TapStage::Area, "{exposure_ms} ms, {radial}");
         plans.push(plan);
     }
-    let by_rays = plans.iter().filter(|plan| plan.looks_for_itself()).count();
-    assert!(by_rays > 10 && plans.len() - by_rays > 10, "truth is told here and there");
     assert!(plans.iter().filter(|plan| plan.copied_from().is_some()).count() >= 4, "some are copied");
     let keys: Vec<PipelineKey> = plans.iter().map(PipelineKey::of).collect();
     assert_all(&keys.iter().map(|key| key.ray).collect(), [RayStage::Pinhole, RayStage::LensMap]);

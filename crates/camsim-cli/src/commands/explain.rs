@@ -191,9 +191,6 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
 /// What the host does there in place of the device.
 fn part_of_host(sequence: &Sequence, plan: &FramePlan) -> Option<&'static str> {
     match host::serves(plan) && draws(&sequence.scene, MAX_SIDE_PX) {
-        true if plan.looks_for_itself() => {
-            Some("draws the ideal frame for its colours, as the device does for the truth, and runs the reverse pipeline")
-        }
         true => Some("draws the ideal frame and runs the reverse pipeline"),
         false => ReverseOn::Best.is_host(plan).then_some("runs the reverse pipeline"),
     }

@@ -157,12 +157,12 @@ impl FramePlan {
         };
         let truth = if self.truth { ", depth and coordinates" } else { "" };
         passes.push(format!("reverse: {ray} -> {temporal} -> {gather} ({taps}) -> photometric{truth}"));
-        if let EdgeStage::Supersampled { samples: samples @ 1.., .. } = self.edges {
+        if let EdgeStage::Supersampled { samples, .. } = self.edges {
             passes.push(format!("rays: {samples} a pixel, where it may see a silhouette"));
         }
         passes.push("readback".to_owned());
-        if self.looks_for_itself() {
-            passes.push("host: a ray in f64 for depth and coordinates of each pixel that may see a silhouette".to_owned());
+        if self.tells_exact_truth() {
+            passes.push("host: rays in f64 for depth and coordinates at edges and creases".to_owned());
         }
         passes
     }

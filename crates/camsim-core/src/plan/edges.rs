@@ -40,7 +40,7 @@ pub enum EdgeStage {
     Supersampled {
         /// Fine pixels along a side of an ideal pixel, each with 4 samples.
         scale: u32,
-        /// Rays over the area and exposure of an output pixel; 0 where silhouettes are known for depth and coordinates alone.
+        /// Rays over the area and exposure of an output pixel.
         samples: u32,
         /// Whether something thinner than a pixel may be in view: silhouettes are then looked for among all samples, otherwise between the
         /// middles of pixels, and only what is near them is drawn with samples.
@@ -155,13 +155,11 @@ pub(super) struct EdgeCase<'a> {
     /// Fine pixels along a side of an ideal pixel, and rays of an output pixel.
     pub fine: u32,
     pub rays: u32,
-    /// Whether depth and coordinates are wanted.
-    pub truth: bool,
 }
 
 /// The edge stage of a frame.
 pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeStage {
-    let EdgeCase { outline, pose, ideal, quality, max_side_px, plain, truth, .. } = *case;
+    let EdgeCase { outline, pose, ideal, quality, max_side_px, plain, .. } = *case;
     let mut skip = |what, reason: String| skipped.push(Skip { what, reason });
     if let Some(reason) = case.reason_for_none {
         skip("silhouette supersampling", reason.to_owned());
@@ -172,10 +170,8 @@ pub(super) fn edge_stage(case: &EdgeCase<'_>, skipped: &mut Vec<Skip>) -> EdgeSt
         return EdgeStage::None;
     }
     if let Some(Contours { at_dn, error_dn, .. }) = plain {
-        let what = if truth { "rays for the colours of silhouettes" } else { "silhouette supersampling" };
-        skip(what, format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"));
-        let thin = || outline.meshes_in_view(pose, ideal.tangents(), case.travel_m);
-        return if truth { EdgeStage::Supersampled { scale: 1, samples: 0, thin: thin() } } else { EdgeStage::None };
+        skip("silhouette supersampling", format!("without it {error_dn:.2}/255 over the picture, {at_dn:.1}/255 at silhouettes"));
+        return EdgeStage::None;
     }
     let scale = most_fine(ideal.size_px, max_side_px).min(case.fine);
     // Ground is not thin. What is drawn in colour keeps its order of drawing.

@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{EdgeStage, FramePlan, Planner, TemporalStage};
+use super::{FramePlan, Planner, TemporalStage};
 use crate::pose::CameraPose;
 
 /// What the centre of a pixel sees.
@@ -25,13 +25,6 @@ impl FramePlan {
     #[must_use]
     pub fn tells_exact_truth(&self) -> bool {
         self.truth && !matches!(self.temporal, TemporalStage::Linear | TemporalStage::Rk2)
-    }
-
-    /// Whether depth and coordinates of pixels at silhouettes come from rays of their own ([`Planner::sight`]): where they are wanted, silhouettes may
-    /// be in view, and the solver looks where the point truly is. The paper's solvers do not, and their coordinates tell where they look.
-    #[must_use]
-    pub fn looks_for_itself(&self) -> bool {
-        self.tells_exact_truth() && self.edges != EdgeStage::None
     }
 }
 
@@ -132,7 +125,7 @@ mod tests {
         let sequence = sequence(None);
         let plan = Planner::new(sequence.clone(), &[Channel::Coords], 16_384).unwrap();
         let (planner, plan) = (&plan, plan.plan(1).unwrap());
-        assert!(plan.looks_for_itself(), "{:?} {:?}", plan.temporal, plan.edges);
+        assert!(plan.tells_exact_truth(), "{:?}", plan.temporal);
         let oracle = Oracle::new(sequence.clone()).unwrap();
         let view = oracle.view(1);
         let key = reference::KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
@@ -158,7 +151,7 @@ mod tests {
     #[test]
     fn where_a_solver_looks_elsewhere_its_coordinates_say_so() {
         let looks = |solver: Option<Solver>, channel: Channel| {
-            Planner::new(sequence(solver), &[channel], 16_384).unwrap().plan(1).unwrap().looks_for_itself()
+            Planner::new(sequence(solver), &[channel], 16_384).unwrap().plan(1).unwrap().tells_exact_truth()
         };
         assert!(looks(Some(Solver::Reproject), Channel::Depth));
         assert!(!looks(Some(Solver::Rk2), Channel::Depth) && !looks(Some(Solver::Linear), Channel::Coords));

@@ -7,10 +7,10 @@
 
 use rayon::prelude::*;
 
-/// Second difference of inverse depth, relative to the largest of the three, from which a ray decides: what is looked up then errs by at most 1e-4.
-pub const BEND: f32 = 4e-4;
+/// Second difference of inverse depth, relative to the largest of the three, from which a ray decides: depths that are looked up elsewhere err by at most a quarter of it.
+pub const BEND: f32 = 1e-3;
 /// Relative change of inverse depth by a ray from which the pixels around it are suspect too.
-pub const CHANGE: f32 = 4e-4;
+pub const CHANGE: f32 = 5e-4;
 
 /// Inverse depths of a frame's pixels (1/m, 0 = nothing), row-major, and which of them have a ray through the lens.
 #[derive(Clone, Copy, Debug)]
@@ -119,7 +119,7 @@ mod tests {
         let column = |found: Vec<[usize; 2]>| found.iter().filter(|at| at[1] == 5).map(|at| at[0]).collect::<Vec<_>>();
         assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.02 })), [3, 4, 5, 6]);
         assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 5.0 { 0.1 } else { 0.0 })), [3, 4, 5, 6]);
-        assert_eq!(column(suspects(1, |_, _| true, |x, _| 0.1 + 1e-4 * (x - 5.0).max(0.0))), [4, 5, 6]);
+        assert_eq!(column(suspects(1, |_, _| true, |x, _| 0.1 + 2e-4 * (x - 5.0).max(0.0))), [4, 5, 6]);
         assert!(suspects(1, |_, _| true, |x, _| 0.1 + 1e-5 * (x - 5.0).max(0.0)).is_empty());
         // At the border of the picture too.
         assert_eq!(column(suspects(1, |_, _| true, |x, _| if x < 1.0 { 0.1 } else { 0.02 })), [0, 1, 2]);

@@ -9,9 +9,7 @@ use camsim_core::{
     temporal::IdealGeometry,
 };
 
-use super::{
-    MAX_FINE_TARGETS, MAX_TARGETS, RenderErrorBase, Session, ahead::Prepared, finished::reverses_on_device, ms_since, slot::Target,
-};
+use super::{MAX_FINE_TARGETS, MAX_TARGETS, RenderErrorBase, Session, ahead::Prepared, ms_since, slot::Target};
 use crate::{
     ideal::{IdealTarget, host::View},
     recorder::Recorder,
@@ -50,10 +48,8 @@ impl Session<'_> {
         let poses: Vec<CameraPose> = plan.keys.iter().map(|key| key.pose).collect();
         let models = plan.model_tolerance(&self.planner.sequence().scenario.quality);
         let by_host = self.on_host.as_ref().is_some_and(|on_host| on_host.draws() && host::serves(plan));
-        let by_device = reverses_on_device(plan, by_host.then_some(()));
         if self.drawn.as_ref().is_some_and(|drawn| {
-            (drawn.target.is_some() || !by_device)
-                && drawn.by_host == by_host
+            drawn.by_host == by_host
                 && drawn.poses == poses
                 && drawn.ideal == plan.ideal
                 && drawn.edges == plan.edges
@@ -80,7 +76,7 @@ impl Session<'_> {
             copy: None,
             ideal_ms: None,
         };
-        if by_device {
+        if !by_host {
             let (target, out_of_order) = self.ideal_on_device(recorder, prepared, slot, &models)?;
             (drawn.target, drawn.out_of_order) = (Some(target), out_of_order);
         }

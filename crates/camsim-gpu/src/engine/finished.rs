@@ -69,7 +69,6 @@ impl Session<'_> {
         let slot = &self.slots[done.slot];
         let from_device = || slot.truth.as_ref().map(Output::read::<Truth>).transpose();
         let (color_rgba, mut truth) = match by_host {
-            Some((picture, None)) if reverses_on_device(&plan, Some(())) => (picture, from_device()?),
             Some(made) => made,
             None => (slot.color.read()?, from_device()?),
         };
@@ -92,9 +91,4 @@ impl Session<'_> {
         }
         Ok(Finished { frame, plan, lod: done.lod, out_of_order: done.out_of_order, times })
     }
-}
-
-/// Whether the device goes through the output frame's pixels: for the picture, or only for the truth at silhouettes, which it lists, so that colours are the same whoever asks for what.
-pub(super) fn reverses_on_device<T>(plan: &FramePlan, on_host: Option<T>) -> bool {
-    on_host.is_none() || plan.looks_for_itself()
 }

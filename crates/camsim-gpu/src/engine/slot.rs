@@ -53,10 +53,10 @@ impl Slot {
         }
     }
 
-    /// Once the frame has been submitted: asks for what the host reads of it, and for what it writes the next one to.
-    pub fn recall(&mut self, has_color: bool, has_truth: bool) {
-        let color = has_color.then_some(&self.color);
-        let outputs = color.into_iter().chain(self.truth.as_ref().filter(|_| has_truth)).map(|output| &output.on_host);
+    /// Once the frame has been submitted: asks for what the host reads of it, the outputs where the device has made them, and for what it writes the next one to.
+    pub fn recall(&mut self, has_outputs: bool) {
+        let outputs =
+            has_outputs.then(|| std::iter::once(&self.color).chain(&self.truth)).into_iter().flatten().map(|output| &output.on_host);
         for on_host in outputs.chain(self.clock.as_ref().map(PassClock::on_host)) {
             // A failed mapping shows when the range is read.
             on_host.map_async(wgpu::MapMode::Read, .., |_| {});

@@ -150,11 +150,11 @@ impl HostKernel {
         Self { segments: tail_segments(), cells: Cells::new() }
     }
 
-    /// The picture of a plan that it [`serves`], linear R G B A, row-major; and the truth about it, where the plan asks for that and does not cast rays for it.
+    /// The picture of a plan that it [`serves`], linear R G B A, row-major; and the truth about it as looked up, where the plan asks for that.
     #[must_use]
     pub fn render(&self, plan: &FramePlan, inputs: &HostInputs<'_>) -> (Vec<f32>, Option<Vec<Truth>>) {
         let key = PipelineKey::of(plan);
-        let tells_truth = key.truth && !plan.looks_for_itself();
+        let tells_truth = key.truth;
         let HostInputs { frame, poses, map, vignette, ideal } = *inputs;
         let [width, height] = frame.size_px.map(|side| side as usize);
         let frame_of_truth = FrameUniforms { sky_reach_px: 0.0, ..*frame };
