@@ -143,12 +143,31 @@ pub struct TrackerSpec {
     pub rate_hz: f64,
     /// Speed limit; `auto` is 1.2 times the 99.9th percentile of the log's own speed.
     pub max_speed_m_s: Auto<f64>,
-    /// Acceleration limit.
-    pub max_acceleration_m_s2: f64,
+    /// Acceleration limit; `auto` is 1.5 times the 99.9th percentile of the smoothed log's own, and at least the paper's 19.6; with the paper's preset it is that.
+    pub max_acceleration_m_s2: Auto<f64>,
     /// Angular rate limit; `auto` as for speed.
     pub max_angular_rate_deg_s: Auto<f64>,
-    /// Angular acceleration limit.
-    pub max_angular_acceleration_deg_s2: f64,
+    /// Angular acceleration limit; `auto` as for acceleration, with the paper's 60.
+    pub max_angular_acceleration_deg_s2: Auto<f64>,
+}
+
+/// Acceleration limit of the paper's experiments: 2 g.
+pub const PAPER_ACCELERATION_M_S2: f64 = 19.6;
+/// Their angular acceleration limit.
+pub const PAPER_ANGULAR_ACCELERATION_DEG_S2: f64 = 60.0;
+
+impl Scenario {
+    /// `[tracker]` as it counts: with the paper's preset `auto` accelerations are the paper's.
+    #[must_use]
+    pub fn tracker_in_force(&self) -> TrackerSpec {
+        let mut tracker = self.tracker.clone();
+        if self.quality.preset == Preset::Paper {
+            let or_paper = |limit: Auto<f64>, paper: f64| Auto::Value(limit.value().unwrap_or(paper));
+            tracker.max_acceleration_m_s2 = or_paper(tracker.max_acceleration_m_s2, PAPER_ACCELERATION_M_S2);
+            tracker.max_angular_acceleration_deg_s2 = or_paper(tracker.max_angular_acceleration_deg_s2, PAPER_ANGULAR_ACCELERATION_DEG_S2);
+        }
+        tracker
+    }
 }
 
 impl Default for TrackerSpec {
@@ -157,9 +176,9 @@ impl Default for TrackerSpec {
             kind: TrackerKind::Sqrt,
             rate_hz: 400.0,
             max_speed_m_s: Auto::Auto,
-            max_acceleration_m_s2: 19.6,
+            max_acceleration_m_s2: Auto::Auto,
             max_angular_rate_deg_s: Auto::Auto,
-            max_angular_acceleration_deg_s2: 60.0,
+            max_angular_acceleration_deg_s2: Auto::Auto,
         }
     }
 }

@@ -18,7 +18,7 @@ use thiserror::Error;
 use crate::{
     flight_log::LogRow,
     pose::BodyState,
-    scenario::{TrackerKind, TrackerSpec},
+    scenario::{PAPER_ACCELERATION_M_S2, PAPER_ANGULAR_ACCELERATION_DEG_S2, TrackerKind, TrackerSpec},
     trajectory::{Trajectory, so3},
 };
 
@@ -56,6 +56,55 @@ pub struct Saturation {
     pub angular_acceleration_s: f64,
 }
 
+/// A limit of the tracker, by its key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// `tracker.max_speed_m_s`.
+    MaxSpeed,
+    /// `tracker.max_acceleration_m_s2`.
+    MaxAcceleration,
+    /// `tracker.max_angular_rate_deg_s`.
+    MaxAngularRate,
+    /// `tracker.max_angular_acceleration_deg_s2`.
+    MaxAngularAcceleration,
+}
+
+impl Limit {
+    /// All of them, in the order of [`ResolvedLimits`].
+    pub const ALL: [Self; 4] = [Self::MaxSpeed, Self::MaxAcceleration, Self::MaxAngularRate, Self::MaxAngularAcceleration];
+
+    /// The key below `[tracker]`.
+    #[must_use]
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::MaxSpeed => "max_speed_m_s",
+            Self::MaxAcceleration => "max_acceleration_m_s2",
+            Self::MaxAngularRate => "max_angular_rate_deg_s",
+            Self::MaxAngularAcceleration => "max_angular_acceleration_deg_s2",
+        }
+    }
+}
+
+/// An unbroken time in which a limit cut what the controller asked for, seconds of path time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Hold {
+    /// Which limit.
+    pub limit: Limit,
+    /// First instant.
+    pub from_s: f64,
+    /// Last instant.
+    pub to_s: f64,
+}
+
+impl Hold {
+    /// Length, seconds.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.to_s - self.from_s
+    }
+}
+
 /// What [`track`] gives.
 #[derive(Clone, Debug)]
 pub struct Tracked {
@@ -65,12 +114,23 @@ pub struct Tracked {
     pub limits: ResolvedLimits,
     /// How long the limits were hit; zero for `linear` and `hold`.
     pub saturation: Saturation,
+    /// The longest times for which a limit was hit, the longest first, at most [`MOST_HOLDS`].
+    pub holds: Vec<Hold>,
     /// Control rate, hertz.
     pub rate_hz: f64,
 }
 
 /// Saturation for longer than this is reported, seconds.
 const SATURATION_WORTH_A_WARNING_S: f64 = 1.0;
+
+/// RMS distance between motion and log from which it is told, metres.
+pub const FAR_M: f64 = 1.0;
+/// RMS angle between motion and log from which it is told, degrees.
+pub const FAR_DEG: f64 = 1.0;
+/// Instants compared for that.
+const MOST_COMPARED: f64 = 20_000.0;
+/// Times at a limit that are told.
+pub const MOST_HOLDS: usize = 32;
 
 impl Tracked {
     /// One sentence for each limit that was hit for more than one second, naming the key to change.
@@ -92,6 +152,21 @@ impl Tracked {
             format!("tracker.{key} = {value:.4} held the platform back for {longest_s:.2} s at a stretch; the path lags the log there, raise it to follow closer")
         })
         .collect()
+    }
+
+    /// One sentence where the motion differs from the interpolated log by more than [`FAR_M`] or [`FAR_DEG`] (RMS): the truth is the motion, not the log.
+    #[must_use]
+    pub fn distance_warning(&self, rows: &[LogRow]) -> Option<String> {
+        let (start_s, end_s) = self.trajectory.span_s();
+        let rate_hz = self.rate_hz.min(MOST_COMPARED / (end_s - start_s).max(1e-9));
+        let TrackReport { rms, max_error, .. } = TrackReport::measure(&self.trajectory, rows, rate_hz)?;
+        let [off_m, most_m] = [rms, max_error].map(|of| DVec3::new(of.north_m, of.east_m, of.down_m).length());
+        (off_m > FAR_M || rms.attitude_deg > FAR_DEG).then(|| {
+            format!(
+                "the tracked motion, which frames and truth follow, is {off_m:.2} m and {:.2} deg RMS from the log (at most {most_m:.1} m, {:.1} deg): see `track --report`, or set tracker.kind = \"spline\" or raise the limits",
+                rms.attitude_deg, max_error.attitude_deg
+            )
+        })
     }
 
     /// Errors against the interpolated log and the motion used, at every control tick.
@@ -159,22 +234,30 @@ const SPLINE_BASE_SIGMA_S: f64 = 0.1;
 pub fn track(rows: &[LogRow], spec: &TrackerSpec) -> Result<Tracked, TrackerError> {
     check_rows(rows)?;
     check_spec(spec)?;
-    let limits = resolve_limits(rows, spec);
-    let (trajectory, saturation) = match spec.kind {
-        TrackerKind::Hold => (piecewise(rows, |_, _| (DVec3::ZERO, DVec3::ZERO)), Saturation::default()),
-        TrackerKind::Linear => (piecewise(rows, constant_velocity), Saturation::default()),
-        TrackerKind::Sqrt | TrackerKind::Spline => {
-            let reference = reference(rows, spec, &limits)?;
-            let (states, saturation) = plant::follow(&reference, &limits);
-            let (start_s, end_s) = (rows[0].t_s, rows[rows.len() - 1].t_s);
-            (Trajectory::uniform(start_s, reference.step_s, end_s, states), saturation)
-        }
+    let rate_hz = spec.rate_hz;
+    let given = |trajectory: Option<Trajectory>, limits, saturation, holds| {
+        let trajectory = Arc::new(trajectory.ok_or(TrackerError::Overflow)?);
+        Ok(Tracked { trajectory, limits, saturation, holds, rate_hz })
     };
-    let trajectory = Arc::new(trajectory.ok_or(TrackerError::Overflow)?);
-    Ok(Tracked { trajectory, limits, saturation, rate_hz: spec.rate_hz })
+    match spec.kind {
+        TrackerKind::Hold | TrackerKind::Linear => {
+            let limits = resolve_limits(rows, spec, [0.0; 2]);
+            let still = |_: &LogRow, _: &LogRow| (DVec3::ZERO, DVec3::ZERO);
+            let trajectory = if spec.kind == TrackerKind::Hold { piecewise(rows, still) } else { piecewise(rows, constant_velocity) };
+            given(trajectory, limits, Saturation::default(), Vec::new())
+        }
+        TrackerKind::Sqrt | TrackerKind::Spline => {
+            let (reference, limits) = reference(rows, spec)?;
+            let plant::Followed { states, saturation, mut holds } = plant::follow(&reference, &limits);
+            let (start_s, end_s) = (rows[0].t_s, rows[rows.len() - 1].t_s);
+            holds.iter_mut().for_each(|hold| (hold.from_s, hold.to_s) = (start_s + hold.from_s, start_s + hold.to_s));
+            given(Trajectory::uniform(start_s, reference.step_s, end_s, states), limits, saturation, holds)
+        }
+    }
 }
 
-fn reference(rows: &[LogRow], spec: &TrackerSpec, limits: &ResolvedLimits) -> Result<Reference, TrackerError> {
+/// What is followed, and the limits, of which those of acceleration are learnt from the smoothed log.
+fn reference(rows: &[LogRow], spec: &TrackerSpec) -> Result<(Reference, ResolvedLimits), TrackerError> {
     let (start_s, span_s) = (rows[0].t_s, rows[rows.len() - 1].t_s - rows[0].t_s);
     let step_s = 1.0 / spec.rate_hz;
     let ticks = (span_s * spec.rate_hz - 1e-6).ceil().max(0.0) + 1.0;
@@ -183,14 +266,15 @@ fn reference(rows: &[LogRow], spec: &TrackerSpec, limits: &ResolvedLimits) -> Re
     }
     let count = ticks as usize + 1;
     let mut log = Interpolated::new(rows).ok_or(TrackerError::Empty)?;
-    Ok(match spec.kind {
-        TrackerKind::Spline => {
-            let smoothed = Reference::smoothed(&mut log, start_s, step_s, count, SPLINE_BASE_SIGMA_S);
-            let raw = Reference::sampled(&mut log, start_s, step_s, count);
-            spline::planned(&raw, smoothed, limits)
-        }
-        _ => Reference::smoothed(&mut log, start_s, step_s, count, REFERENCE_SIGMA_S),
-    })
+    let is_spline = spec.kind == TrackerKind::Spline;
+    let sigma_s = if is_spline { SPLINE_BASE_SIGMA_S } else { REFERENCE_SIGMA_S };
+    let smoothed = Reference::smoothed(&mut log, start_s, step_s, count, sigma_s);
+    let limits = resolve_limits(rows, spec, smoothed.accelerations(AUTO_RANK));
+    if !is_spline {
+        return Ok((smoothed, limits));
+    }
+    let raw = Reference::sampled(&mut log, start_s, step_s, count);
+    Ok((spline::planned(&raw, smoothed, &limits), limits))
 }
 
 fn check_rows(rows: &[LogRow]) -> Result<(), TrackerError> {
@@ -215,9 +299,9 @@ fn check_spec(spec: &TrackerSpec) -> Result<(), TrackerError> {
     let keys = [
         ("rate_hz", Some(spec.rate_hz)),
         ("max_speed_m_s", spec.max_speed_m_s.value()),
-        ("max_acceleration_m_s2", Some(spec.max_acceleration_m_s2)),
+        ("max_acceleration_m_s2", spec.max_acceleration_m_s2.value()),
         ("max_angular_rate_deg_s", spec.max_angular_rate_deg_s.value()),
-        ("max_angular_acceleration_deg_s2", Some(spec.max_angular_acceleration_deg_s2)),
+        ("max_angular_acceleration_deg_s2", spec.max_angular_acceleration_deg_s2.value()),
     ];
     for (key, value) in keys {
         if let Some(value) = value
@@ -240,7 +324,11 @@ const LEAST_SPEED_M_S: f64 = 1.0;
 /// ... and 10 deg/s.
 const LEAST_RATE_RAD_S: f64 = 0.174_532_925_199_432_95;
 
-fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec) -> ResolvedLimits {
+/// `auto` accelerations are this factor times the smoothed log's own: more than speeds need, for what is cut there is a lag that lasts.
+const ACCELERATION_FACTOR: f64 = 1.5;
+
+/// `accelerations`: those of the smoothed log at [`AUTO_RANK`], m/s^2 and rad/s^2.
+fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) -> ResolvedLimits {
     let (mut speeds, mut rates) = (Vec::with_capacity(rows.len()), Vec::with_capacity(rows.len()));
     let mut later = 0;
     for row in rows {
@@ -256,21 +344,32 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec) -> ResolvedLimits {
     }
     ResolvedLimits {
         max_speed_m_s: spec.max_speed_m_s.value().unwrap_or_else(|| (AUTO_FACTOR * high_rank(speeds)).max(LEAST_SPEED_M_S)),
-        max_acceleration_m_s2: spec.max_acceleration_m_s2,
+        max_acceleration_m_s2: spec
+            .max_acceleration_m_s2
+            .value()
+            .unwrap_or_else(|| (ACCELERATION_FACTOR * accelerations[0]).max(PAPER_ACCELERATION_M_S2)),
         max_angular_rate_rad_s: spec
             .max_angular_rate_deg_s
             .value()
             .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(LEAST_RATE_RAD_S), f64::to_radians),
-        max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.to_radians(),
+        max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.value().map_or_else(
+            || (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()),
+            f64::to_radians,
+        ),
     }
 }
 
 /// The value at [`AUTO_RANK`], 0 without values.
-fn high_rank(mut values: Vec<f64>) -> f64 {
+fn high_rank(values: Vec<f64>) -> f64 {
+    at_rank(values, AUTO_RANK)
+}
+
+/// The value at a rank from 0 to 1, 0 without values.
+fn at_rank(mut values: Vec<f64>, rank: f64) -> f64 {
     if values.is_empty() {
         return 0.0;
     }
-    let rank = ((values.len() - 1) as f64 * AUTO_RANK).ceil() as usize;
+    let rank = ((values.len() - 1) as f64 * rank).ceil() as usize;
     *values.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 

@@ -6,7 +6,7 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{Auto, FlightSpec, HeightReference, Scenario},
+    scenario::{Auto, FlightSpec, HeightReference, Scenario, TrackerKind},
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{Tracked, TrackerError, track},
@@ -194,7 +194,7 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
 /// Whether two scenarios have the same log, read and tracked in the same way. The window does not matter: all of the log is tracked.
 fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
     let whole = |flight: &FlightSpec| FlightSpec { window_s: None, ..flight.clone() };
-    whole(&a.flight) == whole(&b.flight) && a.tracker == b.tracker && height_plan(a).0 == height_plan(b).0
+    whole(&a.flight) == whole(&b.flight) && a.tracker_in_force() == b.tracker_in_force() && height_plan(a).0 == height_plan(b).0
 }
 
 /// The log and its trajectory alone: no scene is read.
@@ -204,7 +204,7 @@ fn reads_same_flight(a: &Scenario, b: &Scenario) -> bool {
 pub fn load_flight(scenario: &Scenario) -> Result<(FlightLog, Tracked), LoadError> {
     let (log_height, _) = height_plan(scenario);
     let log = read_flight_log(&scenario.flight.log, &scenario.flight, log_height)?;
-    let tracked = track(&log.rows, &scenario.tracker)?;
+    let tracked = track(&log.rows, &scenario.tracker_in_force())?;
     Ok((log, tracked))
 }
 
@@ -286,6 +286,7 @@ fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64
 #[must_use]
 pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
     let mut warnings = tracked.warnings();
+    warnings.extend(tracked.distance_warning(&log.rows).filter(|_| scenario.tracker.kind != TrackerKind::Hold));
     if log.rows.len() == 1 {
         warnings.push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
     }

@@ -182,9 +182,8 @@ fn channels(loaded: &Loaded, instants: &Instants) -> Vec<Channel> {
     let mut plain = |name: &'static str, points: Vec<[f64; 2]>, limit: Option<f64>| {
         channels.push(Channel { name, note: String::new(), lines: vec![(name, points)], limit, error: None });
     };
-    let spec = &sequence.scenario.tracker;
     plain("speed, m/s", over(times, &|t_s| state(t_s).velocity_ned_m_s.length()), Some(limits.max_speed_m_s));
-    plain("acceleration, m/s2", over(times, &|t_s| state(t_s).acceleration_ned_m_s2.length()), Some(spec.max_acceleration_m_s2));
+    plain("acceleration, m/s2", over(times, &|t_s| state(t_s).acceleration_ned_m_s2.length()), Some(limits.max_acceleration_m_s2));
     let rate_limit = limits.max_angular_rate_rad_s.to_degrees();
     plain("body rate, deg/s", over(times, &|t_s| state(t_s).rate_body_rad_s.length().to_degrees()), Some(rate_limit));
     let focal_px = 0.5 * (camera.focal_px[0] + camera.focal_px[1]);

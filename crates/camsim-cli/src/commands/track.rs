@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use camsim_core::{
-    tracker::{Channels, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
+    tracker::{Channels, Hold, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
     trajectory::Trajectory,
 };
 use camsim_io::write::trajectory_csv;
@@ -39,7 +39,7 @@ pub struct Args {
     /// Where the motion goes; standard output if left out (with --report: not written then)
     #[arg(short, long, value_name = "CSV")]
     output: Option<PathBuf>,
-    /// Print RMS and largest error against the interpolated log, and the largest speeds and accelerations used
+    /// Print RMS and largest error against the interpolated log, the largest speeds and accelerations used, and which limits held the motion back and when
     #[arg(long)]
     report: bool,
     /// Print the report as JSON
@@ -54,7 +54,12 @@ struct Report<'a> {
     measured: &'a TrackReport,
     limits: ResolvedLimits,
     saturation: Saturation,
+    /// The longest times at a limit, seconds on the log's clock.
+    holds: Vec<Hold>,
 }
+
+/// Times at a limit that are printed.
+const SHOWN_HOLDS: usize = 10;
 
 /// Tracks the log, writes the motion, prints the report.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
@@ -74,7 +79,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     }
     if args.report {
         let measured = tracked.report(&log.rows).ok_or_else(|| anyhow!("the flight log has no row to compare with")).or_bad_input()?;
-        report(args.json, &tracked, &measured, console)?;
+        report(args.json, &tracked, &measured, log.epoch_ns, console)?;
     }
     Ok(())
 }
@@ -91,10 +96,13 @@ fn row_count(trajectory: &Trajectory, rate_hz: f64) -> Result<u64, Failure> {
     Ok(rows as u64)
 }
 
-fn report(json: bool, tracked: &Tracked, measured: &TrackReport, console: &mut Console<'_>) -> Result<(), Failure> {
+fn report(json: bool, tracked: &Tracked, measured: &TrackReport, epoch_ns: i64, console: &mut Console<'_>) -> Result<(), Failure> {
     let Tracked { limits, saturation, rate_hz, .. } = *tracked;
+    let on_clock = |t_s: f64| epoch_ns as f64 * 1e-9 + t_s;
+    let holds: Vec<Hold> =
+        tracked.holds.iter().map(|hold| Hold { from_s: on_clock(hold.from_s), to_s: on_clock(hold.to_s), ..*hold }).collect();
     if json {
-        return Ok(console.json(&Report { rate_hz, measured, limits, saturation })?);
+        return Ok(console.json(&Report { rate_hz, measured, limits, saturation, holds })?);
     }
     let TrackReport { rms, max_error, max_used, samples, .. } = measured;
     console.line(format_args!("{samples} instants at {rate_hz} Hz, against the interpolated log"))?;
@@ -105,6 +113,14 @@ fn report(json: bool, tracked: &Tracked, measured: &TrackReport, console: &mut C
     console.line(format_args!("{:<28} {:>12} {:>12} {:>12}", "motion", "used at most", "limit", "held back, s"))?;
     for (name, used, limit, held_s) in motion(max_used, &limits, &saturation) {
         console.line(format_args!("{name:<28} {used:>12.4} {limit:>12.4} {held_s:>12.3}"))?;
+    }
+    if holds.is_empty() {
+        return Ok(console.line("no limit held the motion back")?);
+    }
+    console.line("held back longest, seconds on the log's clock")?;
+    for hold in holds.iter().take(SHOWN_HOLDS) {
+        let (key, duration_s) = (hold.limit.key(), hold.duration_s());
+        console.line(format_args!("  {:.3} to {:.3} ({duration_s:.3} s) by tracker.{key}", hold.from_s, hold.to_s))?;
     }
     Ok(())
 }

@@ -105,14 +105,16 @@ fn check_tracker(check: &mut Check, tracker: &TrackerSpec) {
     check.require(tracker.rate_hz >= 1.0 && tracker.rate_hz <= 100_000.0, "tracker.rate_hz", || {
         format!("must lie in 1..100000, not {}; 400 is the default", tracker.rate_hz)
     });
-    if let Auto::Value(speed) = tracker.max_speed_m_s {
-        check.positive("tracker.max_speed_m_s", speed, "or write \"auto\"");
+    for (key, limit) in [
+        ("tracker.max_speed_m_s", tracker.max_speed_m_s),
+        ("tracker.max_acceleration_m_s2", tracker.max_acceleration_m_s2),
+        ("tracker.max_angular_rate_deg_s", tracker.max_angular_rate_deg_s),
+        ("tracker.max_angular_acceleration_deg_s2", tracker.max_angular_acceleration_deg_s2),
+    ] {
+        if let Auto::Value(limit) = limit {
+            check.positive(key, limit, "or write \"auto\"");
+        }
     }
-    check.positive("tracker.max_acceleration_m_s2", tracker.max_acceleration_m_s2, "19.6 is the default");
-    if let Auto::Value(rate) = tracker.max_angular_rate_deg_s {
-        check.positive("tracker.max_angular_rate_deg_s", rate, "or write \"auto\"");
-    }
-    check.positive("tracker.max_angular_acceleration_deg_s2", tracker.max_angular_acceleration_deg_s2, "60 is the default");
 }
 
 /// Larger pictures than this are typing errors on every adapter there is.
@@ -331,7 +333,7 @@ mod tests {
             ("flight.origin", |s| s.flight.origin = Origin::Geodetic([91.0, 0.0, 0.0])),
             ("tracker.rate_hz", |s| s.tracker.rate_hz = f64::NAN),
             ("tracker.max_speed_m_s", |s| s.tracker.max_speed_m_s = Auto::Value(-1.0)),
-            ("tracker.max_acceleration_m_s2", |s| s.tracker.max_acceleration_m_s2 = f64::INFINITY),
+            ("tracker.max_acceleration_m_s2", |s| s.tracker.max_acceleration_m_s2 = Auto::Value(f64::INFINITY)),
             ("camera.size_px", |s| s.camera.size_px = [640, 0]),
             ("camera.size_px", |s| s.camera.size_px = [u32::MAX, 480]),
             ("camera.focal_px", |s| s.camera.focal_px = [0.0, 500.0]),

@@ -10,7 +10,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::{ResolvedLimits, Saturation, reference::Reference};
+use super::{Hold, Limit, MOST_HOLDS, ResolvedLimits, Saturation, reference::Reference};
 use crate::{
     pose::BodyState,
     trajectory::{advance, so3},
@@ -75,8 +75,18 @@ impl SqrtLoops {
     }
 }
 
-/// Follows the reference from its own first state and returns the state at each tick, with the accelerations until the next one.
-pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> (Vec<BodyState>, Saturation) {
+/// What following a reference gives.
+#[derive(Debug)]
+pub(crate) struct Followed {
+    /// At each tick, with the accelerations until the next one.
+    pub(crate) states: Vec<BodyState>,
+    pub(crate) saturation: Saturation,
+    /// Seconds from the first tick; the longest first.
+    pub(crate) holds: Vec<Hold>,
+}
+
+/// Follows the reference from its own first state.
+pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> Followed {
     let step_s = reference.step_s;
     let linear = SqrtLoops::new(step_s, limits.max_speed_m_s, limits.max_acceleration_m_s2);
     let angular = SqrtLoops::new(step_s, limits.max_angular_rate_rad_s, limits.max_angular_acceleration_rad_s2);
@@ -120,31 +130,62 @@ pub(crate) fn follow(reference: &Reference, limits: &ResolvedLimits) -> (Vec<Bod
     state.acceleration_ned_m_s2 = DVec3::ZERO;
     state.angular_acceleration_body_rad_s2 = DVec3::ZERO;
     states.push(state);
-    (states, saturation.longest)
+    let holds = saturation.finished();
+    Followed { states, saturation: saturation.longest, holds }
 }
 
-/// Longest unbroken time at each limit.
+/// Times at each limit.
 struct SaturationClock {
     step_s: f64,
+    ticks: u64,
     running_s: [f64; 4],
     longest: Saturation,
+    holds: Vec<Hold>,
 }
 
 impl SaturationClock {
     fn new(step_s: f64) -> Self {
-        Self { step_s, running_s: [0.0; 4], longest: Saturation::default() }
+        Self { step_s, ticks: 0, running_s: [0.0; 4], longest: Saturation::default(), holds: Vec::new() }
     }
 
     fn tick(&mut self, limited: [bool; 4]) {
-        let longest = [
-            &mut self.longest.speed_s,
-            &mut self.longest.acceleration_s,
-            &mut self.longest.angular_rate_s,
-            &mut self.longest.angular_acceleration_s,
-        ];
-        for ((running_s, limited), longest_s) in self.running_s.iter_mut().zip(limited).zip(longest) {
-            *running_s = if limited { *running_s + self.step_s } else { 0.0 };
-            *longest_s = longest_s.max(*running_s);
+        for (k, limited) in limited.into_iter().enumerate() {
+            if !limited {
+                self.end(k);
+                continue;
+            }
+            self.running_s[k] += self.step_s;
+            let longest_s = match Limit::ALL[k] {
+                Limit::MaxSpeed => &mut self.longest.speed_s,
+                Limit::MaxAcceleration => &mut self.longest.acceleration_s,
+                Limit::MaxAngularRate => &mut self.longest.angular_rate_s,
+                Limit::MaxAngularAcceleration => &mut self.longest.angular_acceleration_s,
+            };
+            *longest_s = longest_s.max(self.running_s[k]);
         }
+        self.ticks += 1;
+    }
+
+    fn end(&mut self, k: usize) {
+        let duration_s = std::mem::take(&mut self.running_s[k]);
+        if duration_s == 0.0 {
+            return;
+        }
+        let to_s = self.ticks as f64 * self.step_s;
+        self.holds.push(Hold { limit: Limit::ALL[k], from_s: to_s - duration_s, to_s });
+        if self.holds.len() >= 8 * MOST_HOLDS {
+            self.keep_longest();
+        }
+    }
+
+    fn keep_longest(&mut self) {
+        self.holds.sort_by(|a, b| b.duration_s().total_cmp(&a.duration_s()));
+        self.holds.truncate(MOST_HOLDS);
+    }
+
+    fn finished(&mut self) -> Vec<Hold> {
+        (0..Limit::ALL.len()).for_each(|k| self.end(k));
+        self.keep_longest();
+        std::mem::take(&mut self.holds)
     }
 }

@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3, DVec4};
 
+use super::at_rank;
 use crate::{flight_log::LogRow, trajectory::so3};
 
 /// The log between its rows: straight lines in position, great circles in attitude. Rows are in order of time.
@@ -111,6 +112,18 @@ impl Reference {
         self.position_ned_m.len() - 1
     }
 
+    /// Lengths of its accelerations, m/s^2 and rad/s^2, at a rank from 0 (the smallest) to 1 (the largest).
+    pub(crate) fn accelerations(&self, rank: f64) -> [f64; 2] {
+        let inner = 1..self.ticks();
+        let stride = inner.len() / MOST_RANKED + 1;
+        let rate = 1.0 / (self.step_s * self.step_s);
+        let linear = |k: usize| (self.position_ned_m[k + 1] - 2.0 * self.position_ned_m[k] + self.position_ned_m[k - 1]).length();
+        let turn = |k: usize| so3::log(self.ned_from_body[k].inverse() * self.ned_from_body[k + 1]);
+        let angular = |k: usize| (turn(k) - turn(k - 1)).length();
+        let ranked = |of: &dyn Fn(usize) -> f64| rate * at_rank(inner.clone().step_by(stride).map(of).collect(), rank);
+        [ranked(&linear), ranked(&angular)]
+    }
+
     /// Target at tick `k`, below [`Self::ticks`].
     pub(crate) fn target(&self, k: usize) -> Target {
         let (x0, x1) = (self.position_ned_m[k], self.position_ned_m[k + 1]);
@@ -124,6 +137,9 @@ impl Reference {
         }
     }
 }
+
+/// Ticks among which a rank is looked for, at most.
+const MOST_RANKED: usize = 1_000_000;
 
 /// Number of moving averages: four give a kernel with two continuous derivatives.
 const PASSES: usize = 4;

@@ -119,7 +119,7 @@ fn step_response(rate_hz: f64, distance_m: f64, angle_rad: f64) -> (Vec<BodyStat
         position_ned_m: (0..=ticks).map(|k| if k > jump { DVec3::X * distance_m } else { DVec3::ZERO }).collect(),
         ned_from_body: (0..=ticks).map(|k| DQuat::from_rotation_z(if k > jump { angle_rad } else { 0.0 })).collect(),
     };
-    (plant::follow(&reference, &limits).0, limits)
+    (plant::follow(&reference, &limits).states, limits)
 }
 
 #[test]

@@ -38,7 +38,7 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             let own = rig::scenario(camera);
             let scenario = Scenario {
                 flight: FlightSpec { log: data.join("flights/demo_sertig_lawnmower_x5.5.csv"), ..own.flight.clone() },
-                tracker: TrackerSpec { max_acceleration_m_s2: 40.0, ..TrackerSpec::default() },
+                tracker: TrackerSpec::default(),
                 scene: SceneSpec { terrain: Some(terrain), sky: SKY, ..own.scene.clone() },
                 ..own
             };

@@ -2,7 +2,7 @@
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
-    scenario::{FlightSpec, LogFormat, TrackerKind, TrackerSpec},
+    scenario::{Auto, FlightSpec, LogFormat, TrackerKind, TrackerSpec},
     tracker::{Channels, TrackReport, Tracked, track},
 };
 use camsim_io::{builtin, flight_log::read_flight_log};
@@ -47,8 +47,8 @@ pub(super) fn follow(setup: &Setup<'_>) -> Result<(FlightLog, Vec<Followed>), Re
     for (name, kind) in [("sqrt", TrackerKind::Sqrt), ("spline", TrackerKind::Spline)] {
         let spec = TrackerSpec {
             kind,
-            max_acceleration_m_s2: MAX_ACCELERATION_M_S2,
-            max_angular_acceleration_deg_s2: MAX_ANGULAR_ACCELERATION_DEG_S2,
+            max_acceleration_m_s2: Auto::Value(MAX_ACCELERATION_M_S2),
+            max_angular_acceleration_deg_s2: Auto::Value(MAX_ANGULAR_ACCELERATION_DEG_S2),
             ..TrackerSpec::default()
         };
         let tracked = track(&log.rows, &spec).map_err(|error| ReproduceError::made("the tracker", error))?;
