@@ -352,10 +352,10 @@ fn resolve_limits(rows: &[LogRow], spec: &TrackerSpec, accelerations: [f64; 2]) 
             .max_angular_rate_deg_s
             .value()
             .map_or_else(|| (AUTO_FACTOR * high_rank(rates)).max(LEAST_RATE_RAD_S), f64::to_radians),
-        max_angular_acceleration_rad_s2: spec.max_angular_acceleration_deg_s2.value().map_or_else(
-            || (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()),
-            f64::to_radians,
-        ),
+        max_angular_acceleration_rad_s2: spec
+            .max_angular_acceleration_deg_s2
+            .value()
+            .map_or_else(|| (ACCELERATION_FACTOR * accelerations[1]).max(PAPER_ANGULAR_ACCELERATION_DEG_S2.to_radians()), f64::to_radians),
     }
 }
 

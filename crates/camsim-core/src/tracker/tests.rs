@@ -48,6 +48,15 @@ fn spec(kind: TrackerKind, rate_hz: f64) -> TrackerSpec {
     TrackerSpec { kind, rate_hz, ..TrackerSpec::default() }
 }
 
+/// Within the limits of the paper's experiments.
+fn paper_limits(spec: TrackerSpec) -> TrackerSpec {
+    TrackerSpec {
+        max_acceleration_m_s2: Auto::Value(PAPER_ACCELERATION_M_S2),
+        max_angular_acceleration_deg_s2: Auto::Value(PAPER_ANGULAR_ACCELERATION_DEG_S2),
+        ..spec
+    }
+}
+
 fn row(t_s: f64, position_ned_m: DVec3, ned_from_body: DQuat) -> LogRow {
     LogRow { t_s, position_ned_m, ned_from_body }
 }
@@ -85,7 +94,7 @@ fn real_flight_is_followed_closer_than_the_reference_program_does() {
     let spline = [0.105, 0.062, 0.003, 0.026, 0.019, 0.045];
     for (kind, most, rates) in [(TrackerKind::Sqrt, sqrt, &[200.0, 400.0, 800.0][..]), (TrackerKind::Spline, spline, &[200.0, 400.0][..])] {
         for &rate_hz in rates {
-            let tracked = track(&rows, &spec(kind, rate_hz)).unwrap();
+            let tracked = track(&rows, &paper_limits(spec(kind, rate_hz))).unwrap();
             assert_limits_kept(&tracked);
             assert_joined(&tracked.trajectory);
             let report = tracked.report(&rows).unwrap();
@@ -264,6 +273,41 @@ fn a_limit_that_holds_the_platform_back_is_named() {
     let free = track(&rows, &TrackerSpec::default()).unwrap();
     assert!(free.warnings().is_empty());
     assert!((free.limits.max_speed_m_s - 36.0).abs() < 1e-9);
+}
+
+/// A platform that shakes at 1.5 Hz by 20 degrees: 1777 deg/s^2 at most. After 10 s of rest.
+fn agile() -> Vec<LogRow> {
+    let turn = |t_s: f64| if t_s < 10.0 { 0.0 } else { 20_f64.to_radians() * (std::f64::consts::TAU * 1.5 * (t_s - 10.0)).sin() };
+    (0..4000).map(|i| 0.005 * f64::from(i)).map(|t_s| row(t_s, DVec3::ZERO, DQuat::from_rotation_z(turn(t_s)))).collect()
+}
+
+#[test]
+fn accelerations_come_from_the_log_and_are_at_least_the_papers() {
+    let rows = agile();
+    for (kind, most_deg) in [(TrackerKind::Sqrt, 5.0), (TrackerKind::Spline, 0.5)] {
+        let tracked = track(&rows, &spec(kind, 400.0)).unwrap();
+        let limit_deg_s2 = tracked.limits.max_angular_acceleration_rad_s2.to_degrees();
+        // The smoothed log has three quarters to nine tenths of it; the limit leaves half as much room again.
+        assert!((1700.0..2700.0).contains(&limit_deg_s2), "{kind:?}: {limit_deg_s2}");
+        assert_eq!(tracked.limits.max_acceleration_m_s2, PAPER_ACCELERATION_M_S2);
+        let report = tracked.report(&rows).unwrap();
+        assert!(report.rms.attitude_deg < most_deg && tracked.saturation.angular_acceleration_s < 0.1, "{kind:?}: {report:?}");
+    }
+}
+
+#[test]
+fn a_limit_is_told_with_the_time_at_which_it_held_the_motion_back() {
+    let rows = agile();
+    let tracked = track(&rows, &paper_limits(TrackerSpec::default())).unwrap();
+    let first = tracked.holds.first().copied().unwrap();
+    assert_eq!(first.limit, Limit::MaxAngularAcceleration);
+    assert!((first.duration_s() - tracked.saturation.angular_acceleration_s).abs() < 1e-9, "{first:?}");
+    let since = tracked.holds.iter().map(|hold| hold.from_s).fold(f64::INFINITY, f64::min);
+    assert!((9.5..10.3).contains(&since) && tracked.holds.len() <= MOST_HOLDS, "{since}");
+    let warning = tracked.distance_warning(&rows).unwrap();
+    assert!(warning.contains("deg RMS from the log"), "{warning}");
+    let still: Vec<_> = (0..100).map(|i| row(0.1 * f64::from(i), DVec3::X * f64::from(i), DQuat::IDENTITY)).collect();
+    assert_eq!(track(&still, &TrackerSpec::default()).unwrap().distance_warning(&still), None);
 }
 
 #[test]
