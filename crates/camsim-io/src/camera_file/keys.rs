@@ -63,7 +63,7 @@ pub(super) enum Neutral {
 }
 
 impl Neutral {
-    fn is(self, value: &Value) -> bool {
+    pub(super) fn is(self, value: &Value) -> bool {
         let numbers = flat(value);
         let all = |test: fn(f64) -> bool| value != &Value::Bool(true) && numbers.as_ref().is_some_and(|list| list.iter().all(|x| test(*x)));
         match (self, value) {

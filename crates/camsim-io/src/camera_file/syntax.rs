@@ -39,7 +39,9 @@ impl Document {
                 let line = error.location().map(|location| first_line + location.line() as usize);
                 // Its own text draws the place over several lines; the first says what is wrong.
                 let text = error.without_snippet().to_string();
-                SyntaxProblem { line, message: format!("YAML: {}", text.lines().next().unwrap_or_default()) }
+                let first = text.lines().next().unwrap_or_default();
+                // It counts lines from the document's beginning; `line` does from the file's.
+                SyntaxProblem { line, message: format!("YAML: {}", first.split(" at line ").next().unwrap_or(first)) }
             })?;
             match &parsed {
                 None => parsed = Some(value),
@@ -89,7 +91,7 @@ fn documents(text: &str) -> Vec<(usize, String)> {
 fn blank_after_colon(line: String) -> String {
     match line.split_once(':') {
         Some((key, value))
-            if value.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+            if value.starts_with(|c: char| c.is_ascii_alphanumeric() || "-.\"[".contains(c))
                 && key.trim().chars().all(|c| c.is_ascii_alphanumeric() || c == '.' || c == '_')
                 && key.trim().starts_with(|c: char| c.is_ascii_alphabetic()) =>
         {

@@ -40,7 +40,7 @@ pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result
     let (mut found, mut done, mut spoken_of) = (Found::default(), Vec::new(), false);
     for (keys, leaf) in parts.iter().flat_map(|part| part.leaves.iter().map(|leaf| (part.keys, leaf))) {
         let Some(time) = time_of(keys, leaf) else {
-            spoken_of |= known(keys, leaf).is_none() && may_be_a_time(leaf.name());
+            spoken_of |= may_be_a_time(leaf.name()) && is_named(keys, leaf);
             continue;
         };
         if leaf.value.is_null() {
@@ -61,6 +61,9 @@ pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result
             _ => spec.shutter.readout_ms = ms.abs(),
         }
         spec.shutter.readout = turned(found.direction.unwrap_or_default(), *ms < 0.0);
+        if *ms < 0.0 {
+            imported.notes.push(format!("{path} is negative: rows are read the other way round, {:?}", spec.shutter.readout));
+        }
     }
     if let Some((path, true)) = &found.rolling
         && spec.shutter.readout_ms == 0.0
@@ -193,6 +196,15 @@ fn turned(direction: Readout, backwards: bool) -> Readout {
         (Readout::BottomToTop, true) => Readout::TopToBottom,
         (Readout::LeftToRight, true) => Readout::RightToLeft,
         (Readout::RightToLeft, true) => Readout::LeftToRight,
+    }
+}
+
+/// Whether a note will name it.
+fn is_named(keys: &'static [Key], leaf: &Leaf<'_>) -> bool {
+    match known(keys, leaf).map(|key| key.use_) {
+        None => true,
+        Some(Use::Named(neutral)) => !neutral.is(leaf.value),
+        Some(_) => false,
     }
 }
 
