@@ -203,7 +203,7 @@ fn detect(document: &Document) -> Result<CameraFormat, String> {
 fn doubts(spec: &CameraSpec) -> Result<Vec<String>, Problem> {
     let [width, height] = spec.size_px.map(f64::from);
     let [fx, fy] = spec.focal_px;
-    if fx > 0.0 && fy > 0.0 && fx.min(fy) < 0.05 * width.max(height) {
+    if fx > 0.0 && fy > 0.0 && fx.min(fy) < 0.02 * width.max(height) {
         let text = format!(
             "is {fx} and {fy} for a picture of {width} x {height}: too short for pixels. Are these fractions of a side, or millimetres?"
         );
@@ -213,21 +213,43 @@ fn doubts(spec: &CameraSpec) -> Result<Vec<String>, Problem> {
     if fx > 0.0 && fy > 0.0 && !(0.5..=2.0).contains(&(fx / fy)) {
         notes.push(format!("the focal lengths {fx} and {fy} px differ by more than a factor of two: are they right?"));
     }
-    if let Some([cx, cy]) = spec.principal_point_px
-        && let [across, down] = [(2.0 * cx + 1.0) / width, (2.0 * cy + 1.0) / height]
-        && (across.max(down) < 0.85 || across.min(down) > 1.15)
-        && (0.95..=1.05).contains(&(across / down))
-    {
-        let [there_x, there_y] = [across * width, down * height].map(f64::round);
-        notes.push(format!(
-            "the principal point ({cx}, {cy}) would be the middle of a picture of about {there_x} x {there_y}, not of {width} x {height}: is the calibration of another size?"
-        ));
-    } else if let Some([cx, cy]) = spec.principal_point_px
-        && !((-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy))
-    {
-        notes.push(format!("the principal point ({cx}, {cy}) is outside of the picture of {width} x {height}: is the size that of the calibration, and not turned?"));
+    if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
+        let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
+        notes.push(format!("the picture spans about {degrees:.0} degrees across, a lot for a lens that is no fisheye: is the focal length of {fx} in pixels?"));
     }
+    notes.extend(spec.principal_point_px.and_then(|point| doubt_of_middle([width, height], point)));
     Ok(notes)
+}
+
+/// A principal point that would be the middle of a picture of another size, or is nowhere in this one.
+fn doubt_of_middle([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
+    let there = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
+    let size = |[x, y]: [f64; 2]| format!("{x:.0} x {y:.0}");
+    let [across, down] = [there[0] / width, there[1] / height];
+    let turned = [there[0] / height, there[1] / width].iter().all(|ratio| (0.92..=1.08).contains(ratio));
+    if turned && !(0.9..=1.1).contains(&(width / height)) {
+        let text = format!(
+            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, but the size is {}: is it turned?",
+            size(there),
+            size([width, height])
+        );
+        return Some(text);
+    }
+    if (across.max(down) < 0.85 || across.min(down) > 1.15) && (0.95..=1.05).contains(&(across / down)) {
+        let text = format!(
+            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, not of {}: is the calibration of another size?",
+            size(there),
+            size([width, height])
+        );
+        return Some(text);
+    }
+    let inside = (-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy);
+    (!inside).then(|| {
+        format!(
+            "the principal point ({cx}, {cy}) is outside of the picture of {}: is the size that of the calibration?",
+            size([width, height])
+        )
+    })
 }
 
 fn check(path: &Path, spec: &CameraSpec) -> Result<(), CameraFileError> {

@@ -17,8 +17,14 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("value0.intrinsics.intrinsics.fy", Use::Applied, "px"),
     Key::new("value0.intrinsics.intrinsics.cx", Use::Applied, "px"),
     Key::new("value0.intrinsics.intrinsics.cy", Use::Applied, "px"),
-    Key::new("value0.intrinsics.intrinsics.k*", Use::Applied, "coefficients of the model"),
-    Key::new("value0.intrinsics.intrinsics.p*", Use::Applied, "coefficients of the model"),
+    Key::new("value0.intrinsics.intrinsics.k1", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.k2", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.k3", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.k4", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.k5", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.k6", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.p1", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
+    Key::new("value0.intrinsics.intrinsics.p2", Use::Applied, "coefficient; refused unless zero where camera_type has it not"),
     Key::new(
         "value0.intrinsics.intrinsics.rpmax",
         Use::Named(Neutral::Zero),
@@ -69,18 +75,10 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
     let get = |key: &str| number(value, &format!("intrinsics.{key}"));
     let all = |keys: &[&str]| keys.iter().map(|key| get(key)).collect::<Result<Vec<f64>, _>>();
     let kind = word(value, "camera_type").unwrap_or_default();
-    let (model, coefficients) = match kind {
-        "pinhole" => {
-            if let Some(k1) = optional_number(value, "intrinsics.k1")?.filter(|k1| *k1 != 0.0) {
-                return Err(Problem::new(
-                    "intrinsics.k1",
-                    format!("is {k1}, but camera_type `pinhole` has no distortion there: name pinhole-radtan8 or kb4"),
-                ));
-            }
-            (LensModel::BrownConrady, Vec::new())
-        }
-        "kb4" => (LensModel::KannalaBrandt, all(&["k1", "k2", "k3", "k4"])?),
-        "pinhole-radtan8" => (LensModel::BrownConrady, all(&["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"])?),
+    let (model, names): (LensModel, &[&str]) = match kind {
+        "pinhole" => (LensModel::BrownConrady, &[]),
+        "kb4" => (LensModel::KannalaBrandt, &["k1", "k2", "k3", "k4"]),
+        "pinhole-radtan8" => (LensModel::BrownConrady, &["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
         other => {
             let which = models::unknown(other).map_or(String::new(), |name| format!(" ({name})"));
             return Err(Problem::new(
@@ -89,6 +87,16 @@ pub(super) fn import(document: &Document, entry: &Entry<'_>) -> Result<ImportedC
             ));
         }
     };
+    let coefficients = all(names)?;
+    for key in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "xi", "alpha", "beta", "w"].iter().filter(|key| !names.contains(key)) {
+        let key = format!("intrinsics.{key}");
+        if optional_number(value, &key)?.is_some_and(|number| number != 0.0) {
+            return Err(Problem::new(
+                key,
+                format!("is not zero, but camera_type `{kind}` has no such parameter: name the model that is meant"),
+            ));
+        }
+    }
     let sizes = find(&document.value, "value0.resolution").and_then(Value::as_array);
     let of_camera = sizes
         .and_then(|list| list.get(index))

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::choose::Entry;
-use super::document::{Document, Problem, find, numbers, numbers_n, one_of, size, word};
+use super::document::{Document, Problem, find, numbers_n, one_of, size, word};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
@@ -76,8 +76,8 @@ pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCame
     let [fx, fy, cx, cy] = numbers_n(value, "intrinsics")?;
     let size_px = size("resolution", numbers_n(value, "resolution")?)?;
     let key = one_of(value, &["distortion_coeffs", "distortion_coefficients"])?;
-    let list = key.map_or(Ok(Vec::new()), |key| numbers(value, key))?;
     let model = word(value, "distortion_model").unwrap_or_default();
+    let list = models::stated(value, "distortion_model", model, key)?;
     let (model, list) = models::by_name("distortion_model", model, key.unwrap_or("distortion_coeffs"), list)?;
     Ok(camera(format, size_px, [fx, fy], [cx, cy], model, list))
 }

@@ -2,7 +2,9 @@
 
 use camsim_core::scenario::LensModel;
 
-use super::document::{Problem, at_most};
+use serde_json::Value;
+
+use super::document::{Problem, at_most, find, numbers};
 
 /// Model and coefficients in the order that camsim has, out of a model's name; radial-tangential coefficients are in OpenCV's order.
 pub(super) fn by_name(model_key: &str, model: &str, key: &str, coefficients: Vec<f64>) -> Result<(LensModel, Vec<f64>), Problem> {
@@ -27,6 +29,24 @@ pub(super) fn by_name(model_key: &str, model: &str, key: &str, coefficients: Vec
                  imported; calibrate with one of these"
             );
             Err(Problem::new(model_key, text))
+        }
+    }
+}
+
+/// The coefficients at `key`; a file that names a model must have them, and one without a model's name must say that it has none.
+pub(super) fn stated(value: &Value, model_key: &str, model: &str, key: Option<&str>) -> Result<Vec<f64>, Problem> {
+    match key.filter(|key| find(value, key).is_some()) {
+        Some(key) => numbers(value, key),
+        None if model == "none" => Ok(Vec::new()),
+        None if model.is_empty() => {
+            Err(Problem::new(model_key, "is missing, and so are coefficients: write `none` if the lens has no distortion"))
+        }
+        None => {
+            let key = key.unwrap_or("distortion_coeffs");
+            Err(Problem::new(
+                key,
+                format!("is missing, but {model_key} is `{model}`: add it, or write `none` there if the lens has no distortion"),
+            ))
         }
     }
 }

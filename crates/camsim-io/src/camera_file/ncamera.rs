@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::choose::Entry;
-use super::document::{Document, Problem, find, number, numbers, numbers_n, size, word};
+use super::document::{Document, Problem, find, number, numbers_n, size, word};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
@@ -76,8 +76,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
     let [fx, fy, cx, cy] = numbers_n(value, "camera.intrinsics")?;
     let size_px = size("camera.image_width", [number(value, "camera.image_width")?, number(value, "camera.image_height")?])?;
     let key = "camera.distortion.parameters";
-    let coefficients = find(value, key).map_or(Ok(Vec::new()), |_| numbers(value, key))?;
     let kind = word(value, "camera.distortion.type").unwrap_or_default();
+    let coefficients = models::stated(value, "camera.distortion.type", kind, Some(key))?;
     if kind == "fisheye" {
         let text = "is `fisheye` (there the field-of-view model), which no lens here is: calibrate with equidistant";
         return Err(Problem::new("camera.distortion.type", text));

@@ -3,10 +3,12 @@
 use serde_json::Value;
 
 use super::choose::Entry;
-use super::document::{Document, Problem, find, numbers, numbers_n, size, word};
+use super::document::{Document, Problem, find, numbers_n, size, word};
 use super::keys::{Key, Neutral, Use};
 use super::{CameraFormat, ImportedCamera, camera, models};
 
+const DELAY: &str =
+    "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag";
 const ESTIMATOR: &str = "a setting of the estimator";
 
 pub(super) const KEYS: &[Key] = &[
@@ -20,22 +22,17 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("cameras.camera_model", Use::Applied, "pinhole; others are refused"),
     Key::new("cameras.slam_use", Use::Silent, ESTIMATOR),
     Key::new("camera_params.camera_rate", Use::Rate, "frames a second"),
-    Key::new(
-        "camera_params.image_delay",
-        Use::Named(Neutral::Zero),
-        "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag",
-    ),
-    Key::new(
-        "imageDelay",
-        Use::Named(Neutral::Zero),
-        "how much older the picture is than its stamp against the IMU's clock, s: set shutter.delay_ms if the pictures are to lag",
-    ),
+    Key::new("camera_params.image_delay", Use::Named(Neutral::Zero), DELAY),
+    Key::new("imageDelay", Use::Named(Neutral::Zero), DELAY),
+    Key::new("camera_parameters.image_delay", Use::Named(Neutral::Zero), DELAY),
+    Key::new("camera_parameters.camera_rate", Use::Rate, "frames a second"),
     Key::new("camera_params.sigma_*", Use::Silent, ESTIMATOR),
     Key::new("camera_params.timestamp_tolerance", Use::Silent, ESTIMATOR),
     Key::new("camera_params.sync_cameras", Use::Silent, ESTIMATOR),
     Key::new("camera_params.online_calibration.**", Use::Silent, ESTIMATOR),
     Key::new("imu_params.**", Use::Silent, "the IMU"),
-    Key::new("num*", Use::Silent, ESTIMATOR),
+    Key::new("numKeyframes", Use::Silent, ESTIMATOR),
+    Key::new("numImuFrames", Use::Silent, ESTIMATOR),
     Key::new("ceres_options.**", Use::Silent, ESTIMATOR),
     Key::new("*_options.**", Use::Silent, ESTIMATOR),
     Key::new("*_parameters.**", Use::Silent, ESTIMATOR),
@@ -71,8 +68,8 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
         }
     }
     let size_px = size("image_dimension", numbers_n(value, "image_dimension")?)?;
-    let list = find(value, "distortion_coefficients").map_or(Ok(Vec::new()), |_| numbers(value, "distortion_coefficients"))?;
     let kind = word(value, "distortion_type").unwrap_or_default();
+    let list = models::stated(value, "distortion_type", kind, Some("distortion_coefficients"))?;
     let (model, list) = models::by_name("distortion_type", kind, "distortion_coefficients", list)?;
     Ok(camera(CameraFormat::Okvis, size_px, numbers_n(value, "focal_length")?, numbers_n(value, "principal_point")?, model, list))
 }

@@ -76,17 +76,29 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("lens_model", Use::Applied, "the same"),
     Key::new("projection_type", Use::Applied, "the same"),
     Key::new("model", Use::Applied, "the same"),
+    Key::new("DistModel", Use::Applied, "the same"),
+    Key::new("dist_model", Use::Applied, "the same"),
     Key::new("image_shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
     Key::new("img_shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
     Key::new("shape", Use::Refused(Neutral::Never), "rows first or columns first? Write image_width and image_height instead"),
     Key::new("new_camera_matrix", Use::Named(Neutral::Never), "the matrix of undistorted pictures; those that come out are distorted"),
     Key::new("newcameramtx", Use::Named(Neutral::Never), "the matrix of undistorted pictures; those that come out are distorted"),
     Key::new("roi", Use::Named(Neutral::Zero), "the valid part of undistorted pictures; those that come out are distorted"),
-    Key::new("R*", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("R", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("R1", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("R2", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("R_L", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("R_R", Use::Named(Neutral::Identity), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("P", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("P2", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("P_L", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("P_R", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("T_L", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("T_R", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("T", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("E", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("F", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
-    Key::new("P*", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
+    Key::new("P1", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("Q", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("*_projection", Use::Named(Neutral::Zero), "stereo or rectification geometry, which a single camera has not"),
     Key::new("CameraExtrinsicMat", Use::Named(Neutral::Identity), "pose of the camera: set mount by hand"),
@@ -245,7 +257,7 @@ fn model(value: &Value) -> Result<Option<(&'static str, LensModel)>, Problem> {
             say(key, if fisheye { LensModel::KannalaBrandt } else { LensModel::BrownConrady })?;
         }
     }
-    for key in ["model_type", "camera_model", "distortion_type", "lens_model", "projection_type", "model"] {
+    for key in ["model_type", "camera_model", "distortion_type", "lens_model", "projection_type", "model", "DistModel", "dist_model"] {
         let Some(word) = word(value, key) else { continue };
         let plain: String = word.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
         let has = |parts: &[&str]| parts.iter().any(|part| plain.contains(part));

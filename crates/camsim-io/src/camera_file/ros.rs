@@ -45,8 +45,8 @@ pub(super) const KEYS: &[Key] = &[
 const MATRICES: [&str; 3] = ["camera_matrix", "K", "k"];
 
 pub(super) fn fits(document: &Document) -> bool {
-    let has = |key: &&str| find(&document.value, key).is_some();
-    (document.root.is_empty() && MATRICES.iter().any(|key| has(&key)) && has(&"distortion_model")) || document.root == "ini"
+    let has = |key: &str| find(&document.value, key).is_some();
+    (document.root.is_empty() && MATRICES.iter().any(|key| has(key)) && has("distortion_model")) || document.root == "ini"
 }
 
 pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
@@ -93,7 +93,7 @@ pub(super) fn import(value: &Value, ini: bool) -> Result<ImportedCamera, Problem
     let list = match coefficients {
         Some(key) => numbers(value, key)?,
         None if ini => return Err(Problem::new("distortion", "is missing: five zeros are no distortion")),
-        None => Vec::new(),
+        None => models::stated(value, "distortion_model", word(value, "distortion_model").unwrap_or_default(), Some(key))?,
     };
     let (model, list) = if ini {
         by_count(list)?

@@ -15,7 +15,11 @@ pub(super) const KEYS: &[Key] = &[
     Key::new("cam_fy", Use::Applied, "px"),
     Key::new("cam_cx", Use::Applied, "px"),
     Key::new("cam_cy", Use::Applied, "px"),
-    Key::new("cam_d*", Use::Applied, "d0 to d4 of Pinhole: k1 k2 p1 p2 k3"),
+    Key::new("cam_d0", Use::Applied, "Pinhole's k1"),
+    Key::new("cam_d1", Use::Applied, "Pinhole's k2"),
+    Key::new("cam_d2", Use::Applied, "Pinhole's p1"),
+    Key::new("cam_d3", Use::Applied, "Pinhole's p2"),
+    Key::new("cam_d4", Use::Applied, "Pinhole's k3"),
     Key::new("k1", Use::Applied, "of EquidistantCamera; refused in Pinhole unless zero"),
     Key::new("k2", Use::Applied, "of EquidistantCamera; refused in Pinhole unless zero"),
     Key::new("k3", Use::Applied, "of EquidistantCamera; refused in Pinhole unless zero"),
@@ -47,7 +51,7 @@ pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
             )
         }
         model @ "EquidistantCamera" => {
-            unread(&["cam_d0", "cam_d1", "cam_d2", "cam_d3"], model)?;
+            unread(&["cam_d0", "cam_d1", "cam_d2", "cam_d3", "cam_d4"], model)?;
             (LensModel::KannalaBrandt, ["k1", "k2", "k3", "k4"].into_iter().map(|key| number(value, key)).collect::<Result<Vec<f64>, _>>()?)
         }
         other => {

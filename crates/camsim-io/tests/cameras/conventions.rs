@@ -29,6 +29,8 @@ fn kalibrs_files_gone_wrong() {
         ("radtan", "fov", ["cam0.distortion_model", "field-of-view"]),
         ("radtan", "none", ["cam0.distortion_coeffs", "says that there is none"]),
         ("distortion_model: radtan", "distortion_mode: radtan", ["cam0.distortion_coeffs", "says nothing"]),
+        ("  distortion_coeffs: [0.1, 0.2, 0.003, 0.004]\n", "", ["cam0.distortion_coeffs", "is missing"]),
+        ("distortion_coeffs", "distortion_coefs", ["cam0.distortion_coeffs", "is missing"]),
         ("0.003, 0.004]", "0.003]", ["cam0.distortion_coeffs", "has 3 numbers"]),
         ("[400, 401, 320, 240]", "[0.9, 400, 401, 320, 240]", ["cam0.intrinsics", "has 5 numbers"]),
         ("[640, 480]", "[640, 480.5]", ["cam0.resolution", "whole numbers"]),

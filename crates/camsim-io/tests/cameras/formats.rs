@@ -107,7 +107,8 @@ fn basalt_models() {
         ("ucm", r#""alpha": 0.5"#, ["camera_type", "unified camera model"]),
         ("fov", r#""w": 0.5"#, ["camera_type", "field-of-view"]),
         ("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3"#, ["k4", "is missing"]),
-        ("pinhole", r#""k1": 0.1"#, ["k1", "no distortion"]),
+        ("pinhole", r#""k1": 0.1"#, ["k1", "no such parameter"]),
+        ("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4, "p1": 0.01"#, ["p1", "no such parameter"]),
         ("kb4", r#""k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4, "fx": 150"#, ["fx", "twice"]),
     ] {
         refused(kind, "calibration.json", &basalt(kind, numbers), &words);

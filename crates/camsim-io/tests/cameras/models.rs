@@ -82,9 +82,12 @@ fn a_matrix_that_is_none() {
 fn what_is_odd_is_spoken_of() {
     let five = "0.1, 0.2, 0.003, 0.004, 0.5";
     for (from, to, note) in [
-        ("image_width: 640\nimage_height: 480", "image_width: 480\nimage_height: 200", "outside of the picture"),
+        ("image_width: 640\nimage_height: 480", "image_width: 300\nimage_height: 480", "outside of the picture"),
         ("image_width: 640\nimage_height: 480", "image_width: 1280\nimage_height: 960", "about 641 x 481"),
+        ("image_width: 640\nimage_height: 480", "image_width: 480\nimage_height: 640", "is it turned?"),
         ("401, 240", "900, 240", "factor of two"),
+        ("[400, 0, 320, 0, 401", "[50, 0, 320, 0, 50", "162 degrees"),
+        ("image_width", "Readout_time_ms: 12\nimage_width", "no frame rate is in the file"),
         ("image_width", "new_camera_matrix: [380, 0, 320, 0, 381, 240, 0, 0, 1]\nimage_width", "new_camera_matrix"),
         ("image_width", "R1: [0.9, 0.1, 0, 0, 1, 0, 0, 0, 1]\nimage_width", "stereo or rectification"),
         ("image_width", "image_scale: 0.5\nimage_width", "image_scale = 0.5"),

@@ -93,6 +93,7 @@ fn models_of_ros() {
         (with("K: [500, 0, 630, 0, 404, 376, 0, 0, 1]"), ["K", "another thing than camera_matrix"]),
         (with("width: 640"), ["width", "another thing than image_width"]),
         (with("image_width: 640"), ["i.yaml", "duplicate"]),
+        (other("distortion_coefficients", "distortion_coefficents"), ["distortion_coefficients", "is missing"]),
         (with("k4: 0.1"), ["k4", "coefficient"]),
         (other("image_height: 800\n", ""), ["height", "missing"]),
     ] {
