@@ -241,6 +241,21 @@ pub(super) fn hint(document: &Document) -> Option<String> {
     if document.root == "lensdatabase" {
         return Some("this is a data base of lenses without the size of a picture, not a camera".to_owned());
     }
+    if find(value, "fl_x").is_some() && find(value, "w").is_some() {
+        let text = "this is nerfstudio's transforms.json, whose documents have pixel centres at whole numbers and whose program at halves: write camera_matrix, \
+                    distortion_coefficients, image_width and image_height in a YAML file, half a pixel less in cx and cy if COLMAP gave them";
+        return Some(text.to_owned());
+    }
+    if find(value, "ppx").is_some() {
+        let text = "these are a RealSense's intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), distortion_coefficients, image_width and \
+                    image_height in a YAML file";
+        return Some(text.to_owned());
+    }
+    if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some() {
+        let text = "there is a matrix of another program's (MATLAB's is transposed and counts pixels from 1, KITTI's P0 to P3 are of rectified pictures): write \
+                    camera_matrix, distortion_coefficients, image_width and image_height in a YAML file";
+        return Some(text.to_owned());
+    }
     if find(value, "distortion_model").is_some() || find(value, "distortion_coefficients").is_some() {
         return Some(
             "there is a distortion, but no camera matrix of 3 x 3 under a name that is known here (camera_matrix, K, k)".to_owned(),

@@ -32,6 +32,8 @@ struct Found {
     fps: Option<(String, f64)>,
     rolling: Option<(String, bool)>,
     direction: Option<Readout>,
+    /// A frame rate that is none.
+    no_rate: bool,
 }
 
 /// Sets frame rate and shutter; gives the paths of the keys that it used. A note says what was looked for and not found.
@@ -77,7 +79,7 @@ pub(super) fn apply(parts: &[Part<'_>], imported: &mut ImportedCamera) -> Result
         imported.notes.push(format!("the readout of {} ms is longer than the frame period of {period_ms:.3} ms", spec.shutter.readout_ms));
     }
     let no_shutter = found.readout_ms.is_none() && found.rolling.is_none() && !spoken_of;
-    match (found.fps.is_none() && !spoken_of, no_shutter) {
+    match (found.fps.is_none() && !found.no_rate && !spoken_of, no_shutter) {
         (true, true) => imported.notes.push("no frame rate and no shutter times are in the file: fps is 30, the shutter global".to_owned()),
         (true, false) => imported.notes.push("no frame rate is in the file: fps is 30".to_owned()),
         (false, true) => imported.notes.push("no shutter times are in the file: the shutter is global".to_owned()),
@@ -107,6 +109,7 @@ fn take(leaf: &Leaf<'_>, time: Time, rows: f64, found: &mut Found, notes: &mut V
             fps if fps > 0.0 => once(&mut found.fps, leaf, fps, "frames a second"),
             fps => {
                 notes.push(format!("left out: {} = {fps}, which is no frame rate; fps is 30", leaf.path));
+                found.no_rate = true;
                 Ok(())
             }
         },

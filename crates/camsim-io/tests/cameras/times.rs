@@ -86,7 +86,7 @@ fn what_is_said_of_the_shutter_is_true() {
         ("readout_noise: 7", &[Note("cam0.readout_noise = 7"), Without("no shutter times")]),
         ("fps: 60", &[Fps(60.0), Note("no shutter times"), Without("no frame rate")]),
         ("rate_hz: 20\nreadout_ms: 60", &[Fps(20.0), Ms(60.0), Note("longer than the frame period of 50.000 ms")]),
-        ("fps: 0", &[Fps(30.0), Note("no frame rate; fps is 30")]),
+        ("fps: 0", &[Fps(30.0), Note("no frame rate; fps is 30"), Without("no frame rate is in"), Without("no frame rate and")]),
         ("timeshift_cam_imu: 0.002", &[Ms(0.0), Note("timeshift_cam_imu = 0.002")]),
         ("timeshift_cam_imu: 0.0", &[Without("timeshift")]),
         ("imu_rate_hz: 200", &[Fps(30.0), Note("imu_rate_hz = 200")]),
