@@ -30,8 +30,7 @@ fn table(page: &mut String, keys: &[Key]) {
 fn page() -> String {
     let mut page = String::from(
         "# Calibration files that can be imported\n\nMade from the code by `CAMSIM_BLESS=1 cargo test -p camsim-io --lib camera_file`. What published files give is in \
-         [CAMERAS-MEASURED.md](CAMERAS-MEASURED.md).\n\n`camsim camera import FILE [--format NAME] [--camera NAME] -o CAMERA.toml`. The content tells the format; where it tells \
-         several, or none of two readings, the import asks. Of several cameras in a file it asks which.\n\nA key is *applied*, or the file is *refused*, or the key is *named* in a \
+         [CAMERAS-MEASURED.md](CAMERAS-MEASURED.md).\n\n`camsim camera import FILE [--format NAME] [--camera NAME] -o CAMERA.toml`. The content tells the format; where it fits several, or leaves two readings open, the import asks. Of several cameras in a file it asks which.\n\nA key is *applied*, or the file is *refused*, or the key is *named* in a \
          note; `*` stands for any part of a name, `**` for everything below. A number under a key that no table knows is named too, and a coefficient (`k4`, `p3`, ...) that a format \
          does not have is refused unless it is zero. An identity, a zero or an empty value that changes nothing is not spoken of.\n\n## In every format\n",
     );
