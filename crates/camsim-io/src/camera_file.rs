@@ -1,23 +1,39 @@
 //! Camera files: CAMERA.toml, and the calibration files of other programs.
 //!
-//! An importer is one file here: it takes a [`Document`] and gives an [`ImportedCamera`], or says what it cannot take over. What
-//! a camera here cannot express (skew, thin-prism terms, other lens models) is an error, never left out.
+//! An importer is one file here: it takes its part of a [`Document`] and gives an [`ImportedCamera`], or says what it cannot take over. What
+//! a camera here cannot express (skew, thin-prism terms, other lens models) is an error, never left out. Its table of keys says what becomes
+//! of each; a number that no table knows is named in a note.
 
 use std::path::{Path, PathBuf};
 
 use camsim_core::camera::CameraModel;
-use camsim_core::scenario::{CameraSpec, LensModel};
+use camsim_core::scenario::{CameraSpec, LensModel, validate_camera};
 
 mod agisoft;
+mod basalt;
 mod camodocal;
+mod choose;
+mod colmap;
 pub(crate) mod document;
+mod format;
 mod gyroflow;
 mod kalibr;
+mod keys;
+mod models;
+mod ncamera;
+mod okvis;
 mod opencv;
+mod opensfm;
+mod orb_slam;
 mod reference;
 mod ros;
+mod ros_ini;
+mod syntax;
+mod times;
+mod vikit;
 
 use document::{Document, Problem};
+pub use format::CameraFormat;
 
 /// What can go wrong with a camera file.
 #[derive(Debug, thiserror::Error)]
@@ -41,11 +57,7 @@ pub enum CameraFileError {
         message: String,
     },
     /// None of the known formats, or several.
-    #[error(
-        "{}: {what}; known are OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, camodocal (VINS) YAML, the reference \
-         program's XML, Agisoft XML and Gyroflow lens profiles",
-        path.display()
-    )]
+    #[error("{}: {what}; known are {}", path.display(), format::all_titles())]
     Format {
         /// The file.
         path: PathBuf,
@@ -70,73 +82,6 @@ pub enum CameraFileError {
         /// Why not.
         source: camsim_core::camera::CameraError,
     },
-}
-
-/// Formats that can be imported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum CameraFormat {
-    /// OpenCV FileStorage, YAML, XML or JSON.
-    OpenCv,
-    /// Kalibr camchain YAML.
-    Kalibr,
-    /// EuRoC `sensor.yaml`.
-    Euroc,
-    /// ROS `camera_info` YAML.
-    RosCameraInfo,
-    /// camodocal YAML, which VINS-Mono and VINS-Fusion read.
-    Camodocal,
-    /// XML of the paper's reference program.
-    Reference,
-    /// Agisoft Metashape, PhotoScan or Lens XML.
-    Agisoft,
-    /// Gyroflow lens profile JSON.
-    Gyroflow,
-}
-
-impl CameraFormat {
-    /// Every format, in the order of detection.
-    pub const ALL: [Self; 8] =
-        [Self::Reference, Self::Agisoft, Self::Gyroflow, Self::Kalibr, Self::Euroc, Self::RosCameraInfo, Self::Camodocal, Self::OpenCv];
-
-    /// Its name for people and for `--format`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OpenCv => "opencv",
-            Self::Kalibr => "kalibr",
-            Self::Euroc => "euroc",
-            Self::RosCameraInfo => "ros-camera-info",
-            Self::Camodocal => "camodocal",
-            Self::Reference => "reference",
-            Self::Agisoft => "agisoft",
-            Self::Gyroflow => "gyroflow",
-        }
-    }
-
-    fn fits(self, document: &Document) -> bool {
-        match self {
-            Self::OpenCv => opencv::fits(document),
-            Self::Kalibr => kalibr::fits_camchain(document),
-            Self::Euroc => kalibr::fits_euroc(document),
-            Self::RosCameraInfo => ros::fits(document),
-            Self::Camodocal => camodocal::fits(document),
-            Self::Reference => reference::fits(document),
-            Self::Agisoft => agisoft::fits(document),
-            Self::Gyroflow => gyroflow::fits(document),
-        }
-    }
-
-    fn import(self, document: &Document) -> Result<ImportedCamera, Problem> {
-        match self {
-            Self::OpenCv => opencv::import(document),
-            Self::Kalibr => kalibr::import_camchain(document),
-            Self::Euroc => kalibr::import_euroc(document),
-            Self::RosCameraInfo => ros::import(document),
-            Self::Camodocal => camodocal::import(document),
-            Self::Reference => reference::import(document),
-            Self::Agisoft => agisoft::import(document),
-            Self::Gyroflow => gyroflow::import(document),
-        }
-    }
 }
 
 /// What an import gives.
@@ -167,8 +112,32 @@ pub fn import_camera(path: &Path) -> Result<CameraSpec, CameraFileError> {
     import_camera_as(path, None).map(|imported| imported.spec)
 }
 
-/// Imports another program's calibration, in a given format or in the one that its content tells.
+/// Imports another program's calibration, in a given format or in the one that its content tells. A file of several cameras is refused; see
+/// [`import_camera_named`].
 pub fn import_camera_as(path: &Path, format: Option<CameraFormat>) -> Result<ImportedCamera, CameraFileError> {
+    import_camera_named(path, format, None)
+}
+
+/// Names of the cameras in a file, by which [`import_camera_named`] finds them; one empty name if the file has one camera and no name for it.
+pub fn camera_names(path: &Path, format: Option<CameraFormat>) -> Result<Vec<String>, CameraFileError> {
+    let (document, format) = open(path, format)?;
+    let entries = format.entries(&document).map_err(|problem| at_key(path, problem))?;
+    Ok(entries.into_iter().map(|entry| entry.name).collect())
+}
+
+/// As [`import_camera_as`], out of several cameras the one of that name.
+pub fn import_camera_named(path: &Path, format: Option<CameraFormat>, camera: Option<&str>) -> Result<ImportedCamera, CameraFileError> {
+    let asked = format.is_some();
+    let (document, format) = open(path, format)?;
+    let at_key = |problem| at_key(path, problem);
+    let mut imported = import(&document, format, asked, camera).map_err(at_key)?;
+    imported.notes.extend(doubts(&imported.spec).map_err(at_key)?);
+    check(path, &imported.spec)?;
+    Ok(imported)
+}
+
+fn open(path: &Path, format: Option<CameraFormat>) -> Result<(Document, CameraFormat), CameraFileError> {
+    refuse_own_files(path)?;
     let text = read(path)?;
     let document = Document::parse(&text).map_err(|problem| CameraFileError::Syntax {
         path: path.to_owned(),
@@ -179,13 +148,42 @@ pub fn import_camera_as(path: &Path, format: Option<CameraFormat>) -> Result<Imp
         Some(format) => format,
         None => detect(&document).map_err(|what| CameraFileError::Format { path: path.to_owned(), what })?,
     };
-    let imported = format.import(&document).map_err(|problem| CameraFileError::Key {
-        path: path.to_owned(),
-        key: problem.key,
-        message: problem.message,
-    })?;
-    check(path, &imported.spec)?;
+    let document = if format == CameraFormat::Reference { reference::in_force(&document) } else { document };
+    Ok((document, format))
+}
+
+fn at_key(path: &Path, problem: Problem) -> CameraFileError {
+    CameraFileError::Key { path: path.to_owned(), key: problem.key, message: problem.message }
+}
+
+fn import(document: &Document, format: CameraFormat, asked: bool, camera: Option<&str>) -> Result<ImportedCamera, Problem> {
+    let entries = format.entries(document)?;
+    let entry = &entries[choose::choose(&entries, camera)?];
+    let parts = format.parts(document, &entries, entry);
+    for part in &parts {
+        keys::refuse(part.keys, &part.leaves)?;
+    }
+    let mut imported = format.import(document, entry, asked).map_err(|problem| entry.placed(document, problem))?;
+    let mut done = if format == CameraFormat::Reference { Vec::new() } else { times::apply(&parts, &mut imported)? };
+    done.extend(entry.roots.iter().cloned());
+    for part in &parts {
+        imported.notes.extend(keys::left_out(part.keys, &part.leaves, &done));
+    }
     Ok(imported)
+}
+
+/// A CAMERA.toml needs no import; binary files of programs whose text is known get a word on how to convert them.
+fn refuse_own_files(path: &Path) -> Result<(), CameraFileError> {
+    let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let what = match ending.as_str() {
+        "toml" => {
+            read_camera_toml(path)?;
+            "this is a CAMERA.toml, and a good one: give it to a scenario as it is"
+        }
+        "bin" => "this is binary; of COLMAP, run `colmap model_converter --output_type TXT` and import cameras.txt",
+        _ => return Ok(()),
+    };
+    Err(CameraFileError::Syntax { path: path.to_owned(), line: None, message: what.to_owned() })
 }
 
 /// The one format whose marks the document bears.
@@ -193,19 +191,78 @@ fn detect(document: &Document) -> Result<CameraFormat, String> {
     let fitting: Vec<CameraFormat> = CameraFormat::ALL.into_iter().filter(|format| format.fits(document)).collect();
     match fitting[..] {
         [format] => Ok(format),
-        [] => Err("this is no camera file that is known here".to_owned()),
+        [] => Err(format::hint(document).unwrap_or_else(|| "this is no camera file that is known here".to_owned())),
         _ => {
             let names: Vec<&str> = fitting.iter().map(|format| format.name()).collect();
-            Err(format!("the content fits several formats ({}): name the one that is meant", names.join(", ")))
+            Err(format!("the content fits several formats ({}): name the one that is meant with `--format`", names.join(", ")))
         }
     }
+}
+
+/// Numbers that are no camera's in pixels are refused; those that are odd are spoken of.
+fn doubts(spec: &CameraSpec) -> Result<Vec<String>, Problem> {
+    let [width, height] = spec.size_px.map(f64::from);
+    let [fx, fy] = spec.focal_px;
+    if fx > 0.0 && fy > 0.0 && fx.min(fy) < 0.02 * width.max(height) {
+        let text = format!(
+            "is {fx} and {fy} for a picture of {width} x {height}: too short for pixels. Are these fractions of a side, or millimetres?"
+        );
+        return Err(Problem::new("the focal length", text));
+    }
+    let mut notes = Vec::new();
+    if fx > 0.0 && fy > 0.0 && !(0.5..=2.0).contains(&(fx / fy)) {
+        notes.push(format!("the focal lengths {fx} and {fy} px differ by more than a factor of two: are they right?"));
+    }
+    if spec.lens.model != LensModel::KannalaBrandt && fx > 0.0 && fx < 0.15 * width {
+        let degrees = 2.0 * (0.5 * width / fx).atan().to_degrees();
+        notes.push(format!("the picture spans about {degrees:.0} degrees across, a lot for a lens that is no fisheye: is the focal length of {fx} in pixels?"));
+    }
+    notes.extend(spec.principal_point_px.and_then(|point| doubt_of_middle([width, height], point)));
+    Ok(notes)
+}
+
+/// A principal point that would be the middle of a picture of another size, or is nowhere in this one.
+fn doubt_of_middle([width, height]: [f64; 2], [cx, cy]: [f64; 2]) -> Option<String> {
+    let there = [2.0 * cx + 1.0, 2.0 * cy + 1.0];
+    let size = |[x, y]: [f64; 2]| format!("{x:.0} x {y:.0}");
+    let [across, down] = [there[0] / width, there[1] / height];
+    let turned = [there[0] / height, there[1] / width].iter().all(|ratio| (0.92..=1.08).contains(ratio));
+    if turned && !(0.9..=1.1).contains(&(width / height)) {
+        let text = format!(
+            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, but the size is {}: is it turned?",
+            size(there),
+            size([width, height])
+        );
+        return Some(text);
+    }
+    if (across.max(down) < 0.85 || across.min(down) > 1.15) && (0.95..=1.05).contains(&(across / down)) {
+        let text = format!(
+            "the principal point ({cx}, {cy}) would be the middle of a picture of about {}, not of {}: is the calibration of another size?",
+            size(there),
+            size([width, height])
+        );
+        return Some(text);
+    }
+    let inside = (-0.5..=width - 0.5).contains(&cx) && (-0.5..=height - 0.5).contains(&cy);
+    (!inside).then(|| {
+        format!(
+            "the principal point ({cx}, {cy}) is outside of the picture of {}: is the size that of the calibration?",
+            size([width, height])
+        )
+    })
 }
 
 fn check(path: &Path, spec: &CameraSpec) -> Result<(), CameraFileError> {
     let failed = |source| CameraFileError::Camera { path: path.to_owned(), source };
     CameraModel::from_spec(spec).map_err(failed)?;
     camsim_core::camera::ZoomTable::from_spec(spec).map_err(failed)?;
-    Ok(())
+    match validate_camera(spec).into_iter().next() {
+        None => Ok(()),
+        Some(problem) => {
+            let key = problem.key.strip_prefix("camera.").unwrap_or(&problem.key).to_owned();
+            Err(CameraFileError::Key { path: path.to_owned(), key, message: problem.message })
+        }
+    }
 }
 
 fn read(path: &Path) -> Result<String, CameraFileError> {
@@ -242,7 +299,8 @@ fn camera(
     mut coefficients: Vec<f64>,
 ) -> ImportedCamera {
     let used = coefficients.iter().rposition(|k| *k != 0.0).map_or(0, |last| last + 1);
-    coefficients.truncate(used);
+    // Three would be k1, k2 and p1, but could be taken for k1, k2 and k3.
+    coefficients.truncate(if used == 3 && model == LensModel::BrownConrady { 4 } else { used });
     let mut spec = CameraSpec { size_px, focal_px, principal_point_px: Some(principal_point_px), ..CameraSpec::default() };
     // A Kannala-Brandt lens without coefficients is an equidistant fisheye, not a pinhole.
     spec.lens.model = if used == 0 && model == LensModel::BrownConrady { LensModel::Pinhole } else { model };

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_as};
+use camsim_io::camera_file::{CameraFormat, ImportedCamera, import_camera_named};
 
 use crate::{
     console::Console,
@@ -25,8 +25,9 @@ enum Command {
 
 /// Turn another program's calibration into a CAMERA.toml
 ///
-/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info, camodocal (VINS) YAML, the reference program's XML, Agisoft XML and
-/// Gyroflow lens profiles. The format is told by content; if several fit, nothing is guessed and --format names the one that is meant.
+/// Reads OpenCV YAML/XML, Kalibr camchain, EuRoC sensor.yaml, ROS camera_info (file, message, .ini), camodocal (VINS) YAML, COLMAP cameras.txt, Agisoft
+/// Metashape XML, OpenSfM and OpenDroneMap JSON, ORB-SLAM, OKVIS, Basalt, maplab, rpg_svo and ESIM files, the reference program's XML and Gyroflow lens
+/// profiles. The format is told by content; where a file leaves two readings open nothing is guessed, and --format or --camera decides.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example: camsim camera import camchain.yaml -o CAMERA.toml")]
 struct ImportArgs {
@@ -38,6 +39,9 @@ struct ImportArgs {
     /// Read the file as this format
     #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(CameraFormat::ALL.map(CameraFormat::name)))]
     format: Option<String>,
+    /// Of several cameras in the file the one of this name
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
 }
 
 /// Runs a camera command.
@@ -55,7 +59,7 @@ fn import(args: &ImportArgs, console: &mut Console<'_>) -> Result<(), Failure> {
             Some(known.ok_or_else(|| Failure::bad_input(anyhow!("--format {name} is not known")))?)
         }
     };
-    let mut imported = import_camera_as(&args.file, format).or_bad_input()?;
+    let mut imported = import_camera_named(&args.file, format, args.camera.as_deref()).or_bad_input()?;
     keep_vignette_in_reach(&mut imported, &args.file);
     console.note(format_args!("{}: read as {}", args.file.display(), imported.format.name()));
     for note in &imported.notes {

@@ -1,11 +1,11 @@
-//! YAML, JSON and XML as one tree of values.
+//! Text as one tree of values, and what is read out of it by path.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-/// A parsed file.
+/// A parsed file; see [`Document::parse`] in `syntax`.
 #[derive(Debug)]
 pub(crate) struct Document {
-    /// Name of the root element of an XML file; empty otherwise.
+    /// Name of the root element of an XML file; `ini` and `colmap` for those; empty otherwise.
     pub(crate) root: String,
     /// Its content. XML attributes are keys like elements.
     pub(crate) value: Value,
@@ -33,78 +33,12 @@ pub(crate) struct SyntaxProblem {
     pub(crate) message: String,
 }
 
-impl Document {
-    /// Parses by the first character: `<` is XML, `{` JSON, anything else YAML.
-    pub(crate) fn parse(text: &str) -> Result<Self, SyntaxProblem> {
-        match text.trim_start().chars().next() {
-            Some('<') => Self::parse_xml(text),
-            Some('{') => serde_json::from_str(text)
-                .map(|value| Self { root: String::new(), value })
-                .map_err(|error| SyntaxProblem { line: Some(error.line()), message: format!("JSON: {error}") }),
-            Some(_) => Self::parse_yaml(text),
-            None => Err(SyntaxProblem { line: None, message: "the file is empty".to_owned() }),
-        }
-    }
-
-    /// OpenCV's first line `%YAML:1.0` is no YAML directive (those have a space), and its matrix tag is no type that matters here.
-    fn parse_yaml(text: &str) -> Result<Self, SyntaxProblem> {
-        let plain: Vec<&str> = text.lines().map(|line| if line.starts_with("%YAML") { "" } else { line }).collect();
-        let plain = plain.join("\n").replace("!!opencv-matrix", "");
-        serde_saphyr::from_str(&plain).map(|value| Self { root: String::new(), value }).map_err(|error| {
-            let line = error.location().map(|location| location.line() as usize);
-            // Its own text draws the place over several lines; the first says what is wrong.
-            let text = error.without_snippet().to_string();
-            SyntaxProblem { line, message: format!("YAML: {}", text.lines().next().unwrap_or_default()) }
-        })
-    }
-
-    fn parse_xml(text: &str) -> Result<Self, SyntaxProblem> {
-        let options = roxmltree::ParsingOptions { allow_dtd: false, ..roxmltree::ParsingOptions::default() };
-        let tree = roxmltree::Document::parse_with_options(text.trim_start(), options).map_err(|error| {
-            let skipped = text[..text.len() - text.trim_start().len()].lines().count();
-            SyntaxProblem { line: Some(error.pos().row as usize + skipped), message: format!("XML: {error}") }
-        })?;
-        let root = tree.root_element();
-        Ok(Self { root: root.tag_name().name().to_owned(), value: xml_value(root, 0) })
-    }
-}
-
-/// Deeper elements are ignored: no calibration file nests that far, and a hostile one must not exhaust the stack.
-const MAX_DEPTH: usize = 64;
-
-/// An element without attributes and children is its text, as a number where it is one; else a map, repeated names being a list.
-fn xml_value(element: roxmltree::Node<'_, '_>, depth: usize) -> Value {
-    let children = || element.children().filter(roxmltree::Node::is_element);
-    if element.attributes().len() == 0 && children().next().is_none() {
-        return scalar(element.text().unwrap_or_default());
-    }
-    let mut map = Map::new();
-    for attribute in element.attributes() {
-        map.insert(attribute.name().to_owned(), scalar(attribute.value()));
-    }
-    for child in children().filter(|_| depth < MAX_DEPTH) {
-        let value = xml_value(child, depth + 1);
-        match map.get_mut(child.tag_name().name()) {
-            Some(Value::Array(list)) => list.push(value),
-            Some(first) => *first = Value::Array(vec![first.take(), value]),
-            None => {
-                map.insert(child.tag_name().name().to_owned(), value);
-            }
-        }
-    }
-    Value::Object(map)
-}
-
-fn scalar(text: &str) -> Value {
-    let text = text.trim();
-    match text.parse::<f64>().ok().and_then(serde_json::Number::from_f64) {
-        Some(number) => Value::Number(number),
-        None => Value::String(text.to_owned()),
-    }
-}
-
-/// The value at a path of keys `a.b`; null counts as absent. A repeated XML element counts by its last appearance.
+/// The value at a path of keys `a.b`; null counts as absent. A repeated XML element counts by its last appearance. A key may itself be
+/// called `a.b`, as in ORB-SLAM's settings.
 pub(crate) fn find<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
+    if let Some(found) = value.get(path) {
+        return (!found.is_null()).then_some(found);
+    }
     let found = path.split('.').try_fold(value, |value, key| {
         let value = if let Value::Array(list) = value { list.last()? } else { value };
         value.get(key)
@@ -126,13 +60,43 @@ pub(crate) fn optional_number(value: &Value, path: &str) -> Result<Option<f64>, 
 }
 
 /// Also `"308."` and the like, which some writers leave as text.
-fn as_number(value: &Value) -> Option<f64> {
+pub(crate) fn as_number(value: &Value) -> Option<f64> {
     let number = match value {
         Value::Number(number) => number.as_f64(),
-        Value::String(text) => text.trim().parse().ok(),
+        Value::String(text) => finite(text),
         _ => None,
     };
     number.filter(|number| number.is_finite())
+}
+
+fn finite(word: &str) -> Option<f64> {
+    word.trim().parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// The one of several names of a thing that the file uses; two of them that say different things are refused.
+pub(crate) fn one_of<'n>(value: &Value, names: &[&'n str]) -> Result<Option<&'n str>, Problem> {
+    let mut used = names.iter().filter(|name| find(value, name).is_some());
+    let Some(first) = used.next() else { return Ok(None) };
+    match used.find(|other| find(value, other) != find(value, first)) {
+        None => Ok(Some(first)),
+        Some(other) => Err(Problem::new(*other, format!("says another thing than {first}, which means the same: delete one of the two"))),
+    }
+}
+
+/// Yes or no, as a truth value, a number or a word.
+pub(crate) fn flag(value: &Value, path: &str) -> Result<Option<bool>, Problem> {
+    let Some(found) = find(value, path) else { return Ok(None) };
+    as_flag(found).map(Some).ok_or_else(|| Problem::new(path, format!("is {found}, neither yes (1, true) nor no (0, false)")))
+}
+
+pub(crate) fn as_flag(value: &Value) -> Option<bool> {
+    let word = value.as_str().map(|word| word.trim().to_ascii_lowercase());
+    match (value.as_bool(), as_number(value), word.as_deref()) {
+        (Some(yes), ..) => Some(yes),
+        (_, Some(0.0), _) | (.., Some("false" | "no" | "off" | "n")) => Some(false),
+        (_, Some(1.0), _) | (.., Some("true" | "yes" | "on" | "y")) => Some(true),
+        _ => None,
+    }
 }
 
 /// A list of finite numbers: a list, a matrix as list of rows, `{rows, cols, data}`, or (XML) text with blanks between.
@@ -151,7 +115,7 @@ pub(crate) fn numbers(value: &Value, path: &str) -> Result<Vec<f64>, Problem> {
                 other => vec![as_number(other)],
             })
             .collect::<Option<_>>(),
-        Value::String(text) => text.split_whitespace().map(|word| word.parse().ok().filter(|x: &f64| x.is_finite())).collect(),
+        Value::String(text) => text.split_whitespace().map(finite).collect(),
         single => as_number(single).map(|number| vec![number]),
     }
     .ok_or_else(wrong)?;
@@ -173,9 +137,20 @@ pub(crate) fn numbers_n<const N: usize>(value: &Value, path: &str) -> Result<[f6
 
 /// fx, fy and cx, cy of a 3x3 camera matrix.
 pub(crate) fn camera_matrix(value: &Value, path: &str) -> Result<([f64; 2], [f64; 2]), Problem> {
-    let [fx, skew, cx, zero, fy, cy, ..] = numbers_n::<9>(value, path)?;
+    let [fx, skew, cx, zero, fy, cy, last @ ..] = numbers_n::<9>(value, path)?;
+    // Column by column, as MATLAB writes it.
+    if cx == 0.0 && cy == 0.0 && last[0] != 0.0 && last[1] != 0.0 {
+        return Err(Problem::new(
+            path,
+            "is transposed (its last row holds the principal point): write it row by row, fx s cx, 0 fy cy, 0 0 1",
+        ));
+    }
     if skew != 0.0 || zero != 0.0 {
+        let skew = if skew == 0.0 { zero } else { skew };
         return Err(Problem::new(path, format!("has a skew of {skew}, which a camera here cannot have: recalibrate without skew")));
+    }
+    if last != [0.0, 0.0, 1.0] {
+        return Err(Problem::new(path, format!("has the last row {last:?} instead of [0, 0, 1]: this is no camera matrix")));
     }
     Ok(([fx, fy], [cx, cy]))
 }

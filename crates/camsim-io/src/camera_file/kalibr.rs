@@ -1,65 +1,83 @@
 //! Kalibr camchain, and EuRoC's sensor.yaml, which describes one camera in the same words.
 
-use camsim_core::scenario::LensModel;
 use serde_json::Value;
 
-use super::document::{Document, Problem, at_most, find, number, numbers, numbers_n, size, word};
-use super::{CameraFormat, ImportedCamera, camera};
+use super::choose::Entry;
+use super::document::{Document, Problem, find, numbers_n, one_of, size, word};
+use super::keys::{Key, Neutral, Use};
+use super::{CameraFormat, ImportedCamera, camera, models};
+
+const POSE: &str = "pose of the camera to an IMU or to another camera, whose axes are not the body's here: set mount by hand";
+const OFFSET: &str =
+    "clock of the camera against that of an IMU, s: it shifts all stamps alike; set shutter.delay_ms if the pictures are to lag";
+
+pub(super) const KEYS: &[Key] = &[
+    Key::new("cam*.camera_model", Use::Applied, "pinhole; omni, ds, eucm and ucm are refused"),
+    Key::new("cam*.intrinsics", Use::Applied, "fx fy cx cy"),
+    Key::new("cam*.distortion_model", Use::Applied, "radtan, equidistant, none; others are refused"),
+    Key::new("cam*.distortion_coeffs", Use::Applied, "k1 k2 p1 p2 (radtan) or k1 k2 k3 k4 (equidistant)"),
+    Key::new("cam*.distortion_coefficients", Use::Applied, "the same"),
+    Key::new("cam*.resolution", Use::Applied, "width, height"),
+    Key::new("cam*.line_delay", Use::LineDelay(1e3), "s a row; times the rows it is the readout"),
+    Key::new("cam*.line_delay_nanoseconds", Use::LineDelay(1e-6), "ns a row; times the rows it is the readout"),
+    Key::new("cam*.rate_hz", Use::Rate, "frames a second"),
+    Key::new("cam*.timeshift_cam_imu", Use::Named(Neutral::Zero), OFFSET),
+    Key::new("cam*.T_*", Use::Named(Neutral::Identity), POSE),
+    Key::new("cam*.mask*", Use::Named(Neutral::Never), "pixels that are not to be used; set photometric.vignette if they are dark"),
+    Key::new("cam*.cam_overlaps", Use::Silent, "which cameras see the same"),
+    Key::new("cam*.rostopic", Use::Silent, "a name"),
+    Key::new("imu*.**", Use::Silent, "an IMU"),
+];
+
+pub(super) const EUROC_KEYS: &[Key] = &[
+    Key::new("camera_model", Use::Applied, "pinhole; others are refused"),
+    Key::new("intrinsics", Use::Applied, "fx fy cx cy"),
+    Key::new("distortion_model", Use::Applied, "radial-tangential, equidistant, none; others are refused"),
+    Key::new("distortion_coefficients", Use::Applied, "k1 k2 p1 p2 (radial-tangential) or k1 k2 k3 k4 (equidistant)"),
+    Key::new("distortion_coeffs", Use::Applied, "the same"),
+    Key::new("resolution", Use::Applied, "width, height"),
+    Key::new("rate_hz", Use::Rate, "frames a second"),
+    Key::new("line_delay", Use::LineDelay(1e3), "s a row; times the rows it is the readout"),
+    Key::new("timeshift_cam_imu", Use::Named(Neutral::Zero), OFFSET),
+    Key::new("T_*", Use::Named(Neutral::Identity), POSE),
+    Key::new("sensor_type", Use::Silent, "camera"),
+    Key::new("comment", Use::Silent, "free text"),
+];
+
+/// `cam0`, `cam1`, ...
+fn is_camera(key: &str) -> bool {
+    key.strip_prefix("cam").is_some_and(|digits| !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit()))
+}
+
+pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+    let cameras =
+        document.value.as_object().into_iter().flatten().filter(|(key, value)| is_camera(key) && find(value, "intrinsics").is_some());
+    cameras.map(|(key, value)| Entry::new(key.clone(), value, key.clone())).collect()
+}
 
 pub(super) fn fits_camchain(document: &Document) -> bool {
-    document.root.is_empty() && find(&document.value, "cam0.intrinsics").is_some()
+    document.root.is_empty() && !entries(document).is_empty()
 }
 
 pub(super) fn fits_euroc(document: &Document) -> bool {
     document.root.is_empty() && ["intrinsics", "resolution", "distortion_model"].iter().all(|key| find(&document.value, key).is_some())
 }
 
-pub(super) fn import_camchain(document: &Document) -> Result<ImportedCamera, Problem> {
-    let cam0 = find(&document.value, "cam0").ok_or_else(|| Problem::new("cam0", "is missing: this is no camchain"))?;
-    let mut imported =
-        import_camera(cam0, CameraFormat::Kalibr).map_err(|problem| Problem { key: format!("cam0.{}", problem.key), ..problem })?;
-    if find(&document.value, "cam1").is_some() {
-        imported
-            .notes
-            .push("the camchain has several cameras; cam0 was taken (for another one, leave only that one and call it cam0)".to_owned());
-    }
-    imported.notes.push("extrinsics and time shift are those to an IMU that is not simulated: left out".to_owned());
-    imported.notes.push("the file has no frame rate and no shutter times: fps is 30, the shutter global".to_owned());
-    Ok(imported)
-}
-
-pub(super) fn import_euroc(document: &Document) -> Result<ImportedCamera, Problem> {
-    let mut imported = import_camera(&document.value, CameraFormat::Euroc)?;
-    if find(&document.value, "rate_hz").is_some() {
-        imported.spec.fps = number(&document.value, "rate_hz")?;
-    } else {
-        imported.notes.push("the file has no rate_hz: fps is 30".to_owned());
-    }
-    imported.notes.push("T_BS is the pose to an IMU whose axes are not the body's here: set mount by hand".to_owned());
-    Ok(imported)
-}
-
-fn import_camera(value: &Value, format: CameraFormat) -> Result<ImportedCamera, Problem> {
+pub(super) fn import(value: &Value, format: CameraFormat) -> Result<ImportedCamera, Problem> {
     if let Some(model) = word(value, "camera_model")
         && model != "pinhole"
     {
-        return Err(Problem::new("camera_model", format!("is `{model}`: only `pinhole` (with any distortion) can be imported")));
+        let which = models::unknown(model).map_or(String::new(), |name| format!(" ({name})"));
+        let text = format!(
+            "is `{model}`{which}: only `pinhole` can be imported, with radial-tangential or equidistant distortion; calibrate with one of these"
+        );
+        return Err(Problem::new("camera_model", text));
     }
     let [fx, fy, cx, cy] = numbers_n(value, "intrinsics")?;
     let size_px = size("resolution", numbers_n(value, "resolution")?)?;
-    let coefficients = || numbers(value, "distortion_coefficients").or_else(|_| numbers(value, "distortion_coeffs"));
-    let (model, coefficients) = match word(value, "distortion_model").unwrap_or("none") {
-        "none" => (LensModel::BrownConrady, Vec::new()),
-        "radtan" | "radial-tangential" | "plumb_bob" => {
-            (LensModel::BrownConrady, at_most("distortion_coeffs", coefficients()?, 8, "radial-tangential has up to eight")?)
-        }
-        "equidistant" | "equi" => (LensModel::KannalaBrandt, at_most("distortion_coeffs", coefficients()?, 4, "equidistant has four")?),
-        other => {
-            return Err(Problem::new(
-                "distortion_model",
-                format!("is `{other}`: `radtan`, `equidistant` and `none` can be imported; recalibrate with one of these"),
-            ));
-        }
-    };
-    Ok(camera(format, size_px, [fx, fy], [cx, cy], model, coefficients))
+    let key = one_of(value, &["distortion_coeffs", "distortion_coefficients"])?;
+    let model = word(value, "distortion_model").unwrap_or_default();
+    let list = models::stated(value, "distortion_model", model, key)?;
+    let (model, list) = models::by_name("distortion_model", model, key.unwrap_or("distortion_coeffs"), list)?;
+    Ok(camera(format, size_px, [fx, fy], [cx, cy], model, list))
 }

@@ -18,6 +18,11 @@ fn import(name: &str, text: &str) -> Result<ImportedCamera, CameraFileError> {
     import_camera_as(&path, None)
 }
 
+fn import_of(name: &str, text: &str, camera: &str) -> Result<ImportedCamera, CameraFileError> {
+    let (_folder, path) = file(name, text);
+    import_camera_named(&path, None, Some(camera))
+}
+
 fn toml(text: &str) -> Result<CameraSpec, CameraFileError> {
     let (_folder, path) = file("camera.toml", text);
     read_camera_toml(&path)
@@ -51,9 +56,13 @@ fn a_camera_toml_has_the_keys_of_camera_at_its_root() {
 
 #[test]
 fn kalibr_and_euroc() {
-    let imported = import("chain.yaml", EUROC_CHAIN).unwrap();
+    // Several cameras: which one is asked for, not guessed.
+    let which = import("chain.yaml", EUROC_CHAIN).unwrap_err().to_string();
+    assert!(which.contains("there are 2 (`cam0`, `cam1`)") && which.contains("`--camera cam0`"), "{which}");
+    let imported = import_of("chain.yaml", EUROC_CHAIN, "cam0").unwrap();
     assert_eq!(imported.format, CameraFormat::Kalibr);
-    assert!(imported.notes.iter().any(|note| note.contains("cam0 was taken")));
+    let other = import_of("chain.yaml", EUROC_CHAIN, "cam2").unwrap_err().to_string();
+    assert!(other.contains("none is called `cam2`; there are `cam0`, `cam1`"), "{other}");
     assert_eq!(imported.spec.size_px, [752, 480]);
     assert_eq!(imported.spec.principal_point_px, Some([367.215, 248.375]));
     assert_eq!(imported.spec.lens.coefficients, [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]);
@@ -63,11 +72,11 @@ fn kalibr_and_euroc() {
     let euroc = import("sensor.yaml", sensor).unwrap();
     assert_eq!((euroc.format, euroc.spec.fps), (CameraFormat::Euroc, 20.0));
     assert_eq!(euroc.spec.lens, imported.spec.lens);
-    let fisheye = import("chain.yaml", &EUROC_CHAIN.replace("radtan", "equidistant")).unwrap();
+    let fisheye = import_of("chain.yaml", &EUROC_CHAIN.replace("radtan", "equidistant"), "cam0").unwrap();
     assert_eq!(fisheye.spec.lens.model, LensModel::KannalaBrandt);
-    let error = import("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni")).unwrap_err().to_string();
+    let error = import_of("chain.yaml", &EUROC_CHAIN.replace("pinhole", "omni"), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.camera_model") && error.contains("omni"), "{error}");
-    let error = import("chain.yaml", &EUROC_CHAIN.replace("458.654, ", "")).unwrap_err().to_string();
+    let error = import_of("chain.yaml", &EUROC_CHAIN.replace("458.654, ", ""), "cam0").unwrap_err().to_string();
     assert!(error.contains("cam0.intrinsics: has 3 numbers"), "{error}");
 }
 
@@ -83,7 +92,8 @@ fn ros_and_opencv_share_keys_but_are_told_apart() {
     assert_eq!(opencv.format, CameraFormat::OpenCv);
     assert_eq!(opencv.spec, ros.spec);
     assert_eq!(opencv.spec.lens.coefficients, [0.16, -0.27, 0.001, -0.0017]);
-    let fisheye = import("out.yml", &format!("{}fisheye_model: 1\n", body.replace("cols: 5", "cols: 4").replace(", 0]", "]"))).unwrap();
+    let four = body.replace("cols: 5", "cols: 4").replace(", 0]", "]");
+    let fisheye = import("out.yml", &format!("{four}fisheye_model: 1\n")).unwrap();
     assert_eq!(fisheye.spec.lens.model, LensModel::KannalaBrandt);
     let short = import("out.yml", &body.replace("cols: 5", "cols: 4")).unwrap_err().to_string();
     assert!(short.contains("distortion_coefficients: has 5 numbers where rows x cols = 1 x 4"), "{short}");
@@ -187,38 +197,6 @@ fn what_is_no_camera_is_refused() {
     assert!(import("deep.xml", &deep).is_err());
 }
 
-/// Every published file: imported, or refused with a reason. Runs where CAMSIM_DATA names the data folder.
-#[test]
-fn published_files() {
-    let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
-        eprintln!("CAMSIM_DATA is not set: published calibrations are not read");
-        return;
-    };
-    let mut open = vec![data.join("calib/cameras"), data.join("calib/opencv_chessboard"), data.join("calib/gyroflow"), data.join("camsim")];
-    let (mut imported, mut refused) = (0, 0);
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            open.extend(std::fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
-            continue;
-        }
-        if !path.extension().is_some_and(|extension| ["yaml", "yml", "xml", "json"].iter().any(|known| extension == *known)) {
-            continue;
-        }
-        match import_camera_as(&path, None) {
-            Ok(camera) => {
-                imported += 1;
-                eprintln!("{}: {} {:?} {:?}", path.display(), camera.format.name(), camera.spec.lens.model, camera.spec.size_px);
-            }
-            Err(error) => {
-                refused += 1;
-                eprintln!("REFUSED {error}");
-            }
-        }
-    }
-    eprintln!("{imported} imported, {refused} refused");
-    assert!(imported >= 60, "{imported} imported, {refused} refused");
-}
-
 #[test]
 fn camodocal() {
     let pinhole = "%YAML:1.0\n---\nmodel_type: PINHOLE\ncamera_name: camera\nimage_width: 752\nimage_height: 480\ndistortion_parameters:\n   \
@@ -247,3 +225,5 @@ fn camodocal() {
         assert!(error.contains(told), "{name}: {error}");
     }
 }
+
+mod docs;

@@ -1,0 +1,110 @@
+//! COLMAP's `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`. There the centre of the first pixel is (0.5, 0.5).
+
+use camsim_core::scenario::LensModel;
+use serde_json::{Value, json};
+
+use super::choose::Entry;
+use super::document::{Document, Problem, SyntaxProblem, number, numbers, size, word};
+use super::keys::{Key, Use};
+use super::{CameraFormat, ImportedCamera, camera};
+
+pub(super) const KEYS: &[Key] = &[
+    Key::new("cameras.id", Use::Silent, "CAMERA_ID, by which `--camera` names it"),
+    Key::new(
+        "cameras.model",
+        Use::Applied,
+        "MODEL: SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE; others are refused",
+    ),
+    Key::new("cameras.width", Use::Applied, "WIDTH"),
+    Key::new("cameras.height", Use::Applied, "HEIGHT"),
+    Key::new("cameras.params", Use::Applied, "PARAMS; half a pixel is taken off cx and cy"),
+];
+
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn is_camera(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let whole = |word: &str| word.bytes().all(|byte| byte.is_ascii_digit());
+    words.len() > 4
+        && whole(words[0])
+        && words[1].starts_with(|c: char| c.is_ascii_uppercase())
+        && words[1].bytes().all(|byte| byte.is_ascii_uppercase() || byte.is_ascii_digit() || byte == b'_')
+        && words[2..].iter().all(|word| word.parse::<f64>().is_ok())
+}
+
+pub(super) fn looks_so(text: &str) -> bool {
+    lines(text).next().is_some_and(|(_, line)| is_camera(line))
+}
+
+pub(super) fn parse(text: &str) -> Result<Document, SyntaxProblem> {
+    let mut cameras = Vec::new();
+    for (line_number, line) in lines(text) {
+        if !is_camera(line) {
+            let message = format!("`{line}` is no camera: CAMERA_ID MODEL WIDTH HEIGHT and the parameters, with blanks between");
+            return Err(SyntaxProblem { line: Some(line_number), message });
+        }
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let numbers: Vec<f64> = words[2..].iter().filter_map(|word| word.parse().ok()).collect();
+        cameras.push(json!({"id": words[0], "model": words[1], "width": numbers[0], "height": numbers[1], "params": &numbers[2..]}));
+    }
+    Ok(Document { root: "colmap".to_owned(), value: json!({ "cameras": cameras }) })
+}
+
+pub(super) fn fits(document: &Document) -> bool {
+    document.root == "colmap"
+}
+
+pub(super) fn entries(document: &Document) -> Vec<Entry<'_>> {
+    let list = document.value.get("cameras").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+    let entry =
+        |(index, value): (usize, _)| Entry::new(word(value, "id").unwrap_or_default().to_owned(), value, format!("cameras[{index}]"));
+    list.iter().enumerate().map(entry).collect()
+}
+
+/// Names of the parameters, as COLMAP's own source lists them; `None` is a model that a camera here has not.
+fn names(model: &str) -> Option<(LensModel, &'static [&'static str])> {
+    use LensModel::{BrownConrady, KannalaBrandt};
+    Some(match model {
+        "SIMPLE_PINHOLE" => (BrownConrady, &["f", "cx", "cy"]),
+        "PINHOLE" => (BrownConrady, &["fx", "fy", "cx", "cy"]),
+        "SIMPLE_RADIAL" => (BrownConrady, &["f", "cx", "cy", "k1"]),
+        "RADIAL" => (BrownConrady, &["f", "cx", "cy", "k1", "k2"]),
+        "OPENCV" => (BrownConrady, &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"]),
+        "FULL_OPENCV" => (BrownConrady, &["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]),
+        "OPENCV_FISHEYE" => (KannalaBrandt, &["fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"]),
+        "SIMPLE_RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1"]),
+        "RADIAL_FISHEYE" => (KannalaBrandt, &["f", "cx", "cy", "k1", "k2"]),
+        _ => return None,
+    })
+}
+
+pub(super) fn import(value: &Value) -> Result<ImportedCamera, Problem> {
+    let model = word(value, "model").unwrap_or_default();
+    let (lens, names) = names(model).ok_or_else(|| {
+        Problem::new(
+            "MODEL",
+            format!(
+                "is {model}, which no lens here is: reconstruct with OPENCV, FULL_OPENCV or OPENCV_FISHEYE (or one of their short forms)"
+            ),
+        )
+    })?;
+    let params = numbers(value, "params")?;
+    if params.len() != names.len() {
+        let text = format!("has {} parameters where {model} has {} ({})", params.len(), names.len(), names.join(", "));
+        return Err(Problem::new("PARAMS", text));
+    }
+    let get = |name: &str| names.iter().position(|known| *known == name).and_then(|at| params.get(at).copied());
+    let or_zero = |name: &str| get(name).unwrap_or(0.0);
+    let f = or_zero("f");
+    let coefficients = match lens {
+        LensModel::KannalaBrandt => ["k1", "k2", "k3", "k4"].map(or_zero).to_vec(),
+        _ => ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"].map(or_zero).to_vec(),
+    };
+    let size_px = size("WIDTH", [number(value, "width")?, number(value, "height")?])?;
+    let focal_px = [get("fx").unwrap_or(f), get("fy").unwrap_or(f)];
+    let mut imported = camera(CameraFormat::Colmap, size_px, focal_px, [or_zero("cx") - 0.5, or_zero("cy") - 0.5], lens, coefficients);
+    imported.notes.push("the principal point was shifted by half a pixel: COLMAP's image corners are at whole numbers".to_owned());
+    Ok(imported)
+}

@@ -1,0 +1,265 @@
+//! The formats: their names, and which importer serves which.
+
+use serde_json::Value;
+
+use super::choose::Entry;
+use super::document::{Document, Problem, find};
+use super::keys::{Key, Part, leaves};
+use super::{
+    ImportedCamera, agisoft, basalt, camodocal, colmap, gyroflow, kalibr, ncamera, okvis, opencv, opensfm, orb_slam, reference, ros, vikit,
+};
+
+/// Formats that can be imported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum CameraFormat {
+    /// OpenCV FileStorage, YAML, XML or JSON; four coefficients are `k1 k2 p1 p2`.
+    OpenCv,
+    /// The same with the coefficients of OpenCV's fisheye module. Never detected.
+    OpenCvFisheye,
+    /// Kalibr camchain YAML, also OpenVINS'.
+    Kalibr,
+    /// EuRoC `sensor.yaml`.
+    Euroc,
+    /// ROS `camera_info` YAML, file or message.
+    RosCameraInfo,
+    /// ROS `.ini` of `camera_calibration_parsers`.
+    RosIni,
+    /// camodocal YAML, which VINS-Mono and VINS-Fusion read.
+    Camodocal,
+    /// XML of the paper's reference program.
+    Reference,
+    /// Agisoft Metashape, PhotoScan or Lens XML.
+    Agisoft,
+    /// Gyroflow lens profile JSON.
+    Gyroflow,
+    /// COLMAP `cameras.txt`.
+    Colmap,
+    /// ORB-SLAM2 and 3 settings YAML.
+    OrbSlam,
+    /// Basalt calibration JSON.
+    Basalt,
+    /// OKVIS settings YAML.
+    Okvis,
+    /// The aslam camera rig YAML of maplab, rpg_svo_pro and ESIM.
+    NCamera,
+    /// The flat camera YAML of rpg_svo and FAST-LIVO.
+    Vikit,
+    /// OpenSfM and OpenDroneMap JSON.
+    OpenSfm,
+}
+
+impl CameraFormat {
+    /// Every format, in the order of detection.
+    pub const ALL: [Self; 17] = [
+        Self::Reference,
+        Self::Agisoft,
+        Self::Gyroflow,
+        Self::Kalibr,
+        Self::Euroc,
+        Self::RosCameraInfo,
+        Self::RosIni,
+        Self::Camodocal,
+        Self::OpenCv,
+        Self::OpenCvFisheye,
+        Self::Colmap,
+        Self::OrbSlam,
+        Self::Basalt,
+        Self::Okvis,
+        Self::NCamera,
+        Self::Vikit,
+        Self::OpenSfm,
+    ];
+
+    /// Its name for people and for `--format`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::OpenCv => "opencv",
+            Self::OpenCvFisheye => "opencv-fisheye",
+            Self::Kalibr => "kalibr",
+            Self::Euroc => "euroc",
+            Self::RosCameraInfo => "ros-camera-info",
+            Self::RosIni => "ros-ini",
+            Self::Camodocal => "camodocal",
+            Self::Reference => "reference",
+            Self::Agisoft => "agisoft",
+            Self::Gyroflow => "gyroflow",
+            Self::Colmap => "colmap",
+            Self::OrbSlam => "orb-slam",
+            Self::Basalt => "basalt",
+            Self::Okvis => "okvis",
+            Self::NCamera => "ncamera",
+            Self::Vikit => "vikit",
+            Self::OpenSfm => "opensfm",
+        }
+    }
+
+    /// What it is called where formats are listed.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::OpenCv => "OpenCV YAML/XML",
+            Self::OpenCvFisheye => "OpenCV YAML/XML of a fisheye",
+            Self::Kalibr => "Kalibr camchain",
+            Self::Euroc => "EuRoC sensor.yaml",
+            Self::RosCameraInfo => "ROS camera_info (file or message)",
+            Self::RosIni => "ROS .ini",
+            Self::Camodocal => "camodocal (VINS) YAML",
+            Self::Reference => "the reference program's XML",
+            Self::Agisoft => "Agisoft Metashape and Lens XML",
+            Self::Gyroflow => "Gyroflow lens profiles",
+            Self::Colmap => "COLMAP cameras.txt",
+            Self::OrbSlam => "ORB-SLAM2/3 YAML",
+            Self::Basalt => "Basalt JSON",
+            Self::Okvis => "OKVIS YAML",
+            Self::NCamera => "camera rigs of maplab, rpg_svo_pro and ESIM",
+            Self::Vikit => "rpg_svo and FAST-LIVO YAML",
+            Self::OpenSfm => "OpenSfM and OpenDroneMap JSON",
+        }
+    }
+
+    pub(super) fn fits(self, document: &Document) -> bool {
+        match self {
+            Self::OpenCv => opencv::fits(document),
+            Self::OpenCvFisheye => false,
+            Self::Kalibr => kalibr::fits_camchain(document),
+            Self::Euroc => kalibr::fits_euroc(document),
+            Self::RosCameraInfo => document.root.is_empty() && ros::fits(document),
+            Self::RosIni => document.root == "ini",
+            Self::Camodocal => camodocal::fits(document),
+            Self::Reference => reference::fits(document),
+            Self::Agisoft => agisoft::fits(document),
+            Self::Gyroflow => gyroflow::fits(document),
+            Self::Colmap => colmap::fits(document),
+            Self::OrbSlam => orb_slam::fits(document),
+            Self::Basalt => basalt::fits(document),
+            Self::Okvis => okvis::fits(document),
+            Self::NCamera => ncamera::fits(document),
+            Self::Vikit => vikit::fits(document),
+            Self::OpenSfm => opensfm::fits(document),
+        }
+    }
+
+    /// The cameras of a file.
+    pub(super) fn entries(self, document: &Document) -> Result<Vec<Entry<'_>>, Problem> {
+        Ok(match self {
+            Self::OpenCv | Self::OpenCvFisheye => {
+                let entries = opencv::entries(document);
+                if entries.is_empty() {
+                    return Err(Problem::new("camera_matrix", "is missing, or is not 3 x 3"));
+                }
+                entries
+            }
+            Self::Kalibr => kalibr::entries(document),
+            Self::RosIni => ros::entries(document),
+            Self::Colmap => colmap::entries(document),
+            Self::OrbSlam => orb_slam::entries(document),
+            Self::Basalt => basalt::entries(document),
+            Self::Okvis => okvis::entries(document),
+            Self::NCamera => ncamera::entries(document),
+            Self::Agisoft => return agisoft::entries(document),
+            Self::OpenSfm => return opensfm::entries(document),
+            Self::Euroc | Self::RosCameraInfo | Self::Camodocal | Self::Reference | Self::Gyroflow | Self::Vikit => {
+                Entry::only(&document.value)
+            }
+        })
+    }
+
+    /// Its tables of keys, each with what it is about.
+    pub(super) fn tables(self) -> &'static [(&'static str, &'static [Key])] {
+        match self {
+            Self::OpenCv | Self::OpenCvFisheye => &[("", opencv::KEYS)],
+            Self::Kalibr => &[("", kalibr::KEYS)],
+            Self::Euroc => &[("", kalibr::EUROC_KEYS)],
+            Self::RosCameraInfo => &[("", ros::KEYS)],
+            Self::RosIni => &[("", ros::INI_KEYS)],
+            Self::Camodocal => &[("", camodocal::KEYS)],
+            Self::Reference => &[("", reference::KEYS)],
+            Self::Agisoft => &[("a calibration", agisoft::KEYS), ("a sensor of a project, below its place", agisoft::SENSOR_KEYS)],
+            Self::Gyroflow => &[("", gyroflow::KEYS)],
+            Self::Colmap => &[("", colmap::KEYS)],
+            Self::OrbSlam => &[("", orb_slam::KEYS)],
+            Self::Basalt => &[("", basalt::KEYS)],
+            Self::Okvis => &[("", okvis::KEYS)],
+            Self::NCamera => &[("", ncamera::KEYS)],
+            Self::Vikit => &[("", vikit::KEYS)],
+            Self::OpenSfm => &[("a camera, below its name", opensfm::KEYS)],
+        }
+    }
+
+    /// What of the file is about the chosen camera, with the tables that it is judged by.
+    pub(super) fn parts<'a>(self, document: &'a Document, entries: &[Entry<'a>], chosen: &Entry<'a>) -> Vec<Part<'a>> {
+        let keys = self.tables()[0].1;
+        match self {
+            // What else is in such a file are poses and points.
+            Self::OpenSfm => vec![Part { keys, leaves: leaves(chosen.value) }],
+            Self::Agisoft if document.root == "document" => {
+                let calibration = agisoft::calibration_of(chosen.value).map(|value| Part { keys, leaves: leaves(value) });
+                calibration.into_iter().chain([Part { keys: agisoft::SENSOR_KEYS, leaves: leaves(chosen.value) }]).collect()
+            }
+            _ => {
+                let mut leaves = leaves(&document.value);
+                leaves.retain(|leaf| chosen.holds(&leaf.path) || !entries.iter().any(|other| other.holds(&leaf.path)));
+                vec![Part { keys, leaves }]
+            }
+        }
+    }
+
+    /// `asked` is whether the user named the format.
+    pub(super) fn import(self, document: &Document, entry: &Entry<'_>, asked: bool) -> Result<ImportedCamera, Problem> {
+        let value = entry.value;
+        match self {
+            Self::OpenCv | Self::OpenCvFisheye => opencv::import(entry, self, asked),
+            Self::Kalibr | Self::Euroc => kalibr::import(value, self),
+            Self::RosCameraInfo => ros::import(value, false),
+            Self::RosIni => ros::import(value, true),
+            Self::Camodocal => camodocal::import(value),
+            Self::Reference => reference::import(value),
+            Self::Agisoft => agisoft::import(document, value),
+            Self::Gyroflow => gyroflow::import(value),
+            Self::Colmap => colmap::import(value),
+            Self::OrbSlam => orb_slam::import(value, &entry.name),
+            Self::Basalt => basalt::import(document, entry),
+            Self::Okvis => okvis::import(value),
+            Self::NCamera => ncamera::import(value),
+            Self::Vikit => vikit::import(value),
+            Self::OpenSfm => opensfm::import(value),
+        }
+    }
+}
+
+/// Every format's title, with commas between.
+pub(super) fn all_titles() -> String {
+    CameraFormat::ALL.map(CameraFormat::title).join(", ")
+}
+
+/// A word on files that are near a camera file.
+pub(super) fn hint(document: &Document) -> Option<String> {
+    let value = &document.value;
+    let calibrations: Vec<&str> = (0..8).filter_map(|index| find(value, &format!("cam{index}_calib")).and_then(Value::as_str)).collect();
+    if !calibrations.is_empty() {
+        return Some(format!("this names its cameras in files of their own: import one of those ({})", calibrations.join(", ")));
+    }
+    if document.root == "lensdatabase" {
+        return Some("this is a data base of lenses without the size of a picture, not a camera".to_owned());
+    }
+    if find(value, "fl_x").is_some() && find(value, "w").is_some() {
+        let text = "this is nerfstudio's transforms.json, whose documents have pixel centres at whole numbers and whose program at halves: write camera_matrix, \
+                    distortion_coefficients, image_width and image_height in a YAML file, half a pixel less in cx and cy if COLMAP gave them";
+        return Some(text.to_owned());
+    }
+    if find(value, "ppx").is_some() {
+        let text = "these are a RealSense's intrinsics: write camera_matrix ([fx, 0, ppx, 0, fy, ppy, 0, 0, 1]), distortion_coefficients, image_width and \
+                    image_height in a YAML file";
+        return Some(text.to_owned());
+    }
+    if find(value, "IntrinsicMatrix").is_some() || find(value, "P0").is_some() && find(value, "P1").is_some() {
+        let text = "there is a matrix of another program's (MATLAB's is transposed and counts pixels from 1, KITTI's P0 to P3 are of rectified pictures): write \
+                    camera_matrix, distortion_coefficients, image_width and image_height in a YAML file";
+        return Some(text.to_owned());
+    }
+    if find(value, "distortion_model").is_some() || find(value, "distortion_coefficients").is_some() {
+        return Some(
+            "there is a distortion, but no camera matrix of 3 x 3 under a name that is known here (camera_matrix, K, k)".to_owned(),
+        );
+    }
+    None
+}
