@@ -17,10 +17,12 @@ mod accessor;
 mod checks;
 mod emitted;
 mod material;
+mod mend;
 mod normals;
 mod pose;
 mod primitive;
 mod source;
+mod treatments;
 
 use material::Materials;
 use pose::Pose;
@@ -150,7 +152,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         reach_m: 0.0,
     };
     for node in scene.nodes() {
-        reader.node(&node, DAffine3::IDENTITY, 0)?;
+        reader.node(&node, DAffine3::IDENTITY, false, 0)?;
     }
     let Reader { parts, mut notes, materials, reach_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
     if parts.is_empty() {
@@ -162,6 +164,10 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     if options.time_s.is_none() && options.animation.is_some() {
         notes.push("animation says nothing without time_s: its nodes are as they stand; give the time of the file that is meant".into());
     }
+    if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
+        notes.push("has animations, and no time_s says which instant of them is meant: its nodes are as they stand".into());
+    }
+    notes.extend(source.notes.iter().cloned());
     notes.extend(pose_notes);
     notes.extend(materials.notes);
     notes.sort();
@@ -185,21 +191,23 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, depth: usize) -> Result<(), GltfError> {
+    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, is_hidden: bool, depth: usize) -> Result<(), GltfError> {
         if depth > DEEPEST {
             return Err(self.source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
         }
         if !self.met.insert(node.index()) {
             return Err(self.source.broken(format!("nodes.{}: has two parents", node.index())));
         }
+        // What is not seen must be no tree of its own either.
+        let is_hidden = is_hidden || !self.source.is_visible(node.index());
         let model_from_node = model_from_parent * self.pose.parent_from_node(node);
-        if let Some(mesh) = node.mesh() {
+        if let Some(mesh) = node.mesh().filter(|_| !is_hidden) {
             let instances = self.source.instances(node.index())?;
             for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, &mesh, model_from_node * node_from_instance)?;
             }
         }
-        node.children().try_for_each(|child| self.node(&child, model_from_node, depth + 1))
+        node.children().try_for_each(|child| self.node(&child, model_from_node, is_hidden, depth + 1))
     }
 
     fn mesh(&mut self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, model_from_node: DAffine3) -> Result<(), GltfError> {

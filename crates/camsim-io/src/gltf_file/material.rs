@@ -73,8 +73,11 @@ impl<'a> Materials<'a> {
             Some(of) => ("extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", of.diffuse_factor(), of.diffuse_texture()),
             None => ("pbrMetallicRoughness.baseColorFactor", base.base_color_factor(), base.base_color_texture()),
         };
-        let emitted = material.emissive_factor();
-        self.check_factors(material, [(key, &factor), ("emissiveFactor", &emitted)])?;
+        let strength = self.source.emissive_strength(material.index());
+        let emitted = material.emissive_factor().map(|part| part * strength);
+        let emitted_key = if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
+        self.check_factors(material, [(key, &factor), (emitted_key, &emitted)])?;
+        let emitted = emitted.map(|part| part.clamp(0.0, 1.0));
         let emits = emitted.iter().any(|&part| part > 0.0);
         // Alpha is the base colour's, black or not.
         let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
@@ -138,7 +141,7 @@ impl<'a> Materials<'a> {
 
     /// Refuses factors that are no numbers, and says which are beyond what there is.
     fn check_factors(&mut self, material: &gltf::Material<'_>, factors: [(&str, &[f32]); 2]) -> Result<(), GltfError> {
-        let name = material.index().map_or_else(|| "the material of what has none".to_owned(), |index| format!("materials.{index}"));
+        let name = self.source.material_name(material.index());
         for (key, parts) in factors {
             if parts.iter().any(|part| !part.is_finite()) {
                 return Err(self.source.broken(format!("{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1")));
@@ -216,7 +219,7 @@ impl<'a> Materials<'a> {
         let bytes = self.source.image(image)?;
         let number = image.index();
         let wrong = |reason: String| self.source.broken(format!("images.{number}: {reason}"));
-        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG or JPEG: {reason}; write it as one of them"));
+        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG, JPEG or WebP: {reason}; write it as one of them"));
         let [width, height] = crate::pictures::size_of_bytes(&bytes).map_err(undecoded)?;
         if width.max(height) > LARGEST_PX {
             return Err(wrong(format!("is of {width}x{height} px, and at most {LARGEST_PX} on a side can be shown: make it smaller")));

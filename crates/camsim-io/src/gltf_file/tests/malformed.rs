@@ -124,7 +124,7 @@ fn what_is_not_there_is_named_with_its_place() {
         (vec![("/asset", json!({ "version": "2.0", "minVersion": "2.9" }))], "needs glTF 2.9 (asset.minVersion)"),
         (vec![("/asset", Value::Null)], "has no asset.version"),
         (vec![("/nodes/0/mesh", json!(5))], "is not valid: nodes[0].mesh names what is not there; write the file again"),
-        (vec![("/bufferViews/4/byteLength", json!(0))], "images.0: cannot be decoded as PNG or JPEG: it has no bytes"),
+        (vec![("/bufferViews/4/byteLength", json!(0))], "images.0: cannot be decoded as PNG, JPEG or WebP: it has no bytes"),
     ] {
         let error = with(&changes).unwrap_err();
         assert!(error.contains(wanted), "{changes:?}\n  gives {error}\n  not   {wanted}");
@@ -158,7 +158,7 @@ fn pictures_of_any_size_are_shown_or_named() {
     assert!(good(&claims).read().unwrap_err().contains("images.0: "));
     for bytes in [&b"hello"[..], b"\xabKTX 20\xbb\r\n\x1a\n", &png(4, 4)[..40]] {
         let error = good(bytes).read().unwrap_err();
-        assert!(error.contains("images.0: cannot be decoded as PNG or JPEG: "), "{error}");
+        assert!(error.contains("images.0: cannot be decoded as PNG, JPEG or WebP: "), "{error}");
     }
 }
 
