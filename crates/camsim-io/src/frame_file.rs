@@ -67,6 +67,8 @@ mod packed;
 mod poses;
 mod schema;
 mod set;
+#[cfg(test)]
+mod treatments;
 
 pub use set::{FrameSet, read_frame_set};
 

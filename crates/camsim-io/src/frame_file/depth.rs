@@ -221,11 +221,16 @@ fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameF
     match picture {
         DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
         DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
-            let message = format!("is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or give it as {kinds}", packed::FORMULAS);
+            let message = format!(
+                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or give it as {kinds}",
+                packed::FORMULAS
+            );
             Err(failure(path, message))
         }
         DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
-            let message = format!("is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are no distances: give depth as {kinds}");
+            let message = format!(
+                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are no distances: give depth as {kinds}"
+            );
             Err(failure(path, message))
         }
         _ => Err(failure(path, format!("is no 16-bit grey picture of one channel: give depth as {kinds}"))),

@@ -95,7 +95,9 @@ impl Planes {
         }
         if self.other_primaries {
             let path = self.path.display();
-            notes.push(format!("{path}: its chromaticities are not those of sRGB: colours are left as they are stored; convert the picture if they matter"));
+            notes.push(format!(
+                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; convert the picture if they matter"
+            ));
         }
         notes
     }

@@ -90,7 +90,8 @@ fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
     }
     let factor = order.abs();
     let values = lines.into_iter().flat_map(|line| line.chunks_exact(4).map(|bytes| factor * number(bytes))).collect();
-    let scaled = || format!("{}: the scale {} of its header is applied: depth is {factor} times the numbers stored", path.display(), words[3]);
+    let scaled =
+        || format!("{}: the scale {} of its header is applied: depth is {factor} times the numbers stored", path.display(), words[3]);
     let notes = if factor == 1.0 { Vec::new() } else { vec![scaled()] };
     Ok(Stored { size_px: [width, height], values, unit: Unit::Floats, notes })
 }

@@ -69,7 +69,10 @@ fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
     let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
     let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
     if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
-        return Err(failure(path, "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is one of these"));
+        return Err(failure(
+            path,
+            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is one of these",
+        ));
     }
     let side = |word: Option<[u8; 4]>| word.map_or(0, u32::from_le_bytes);
     let size_px = [side(words.next()), side(words.next())];

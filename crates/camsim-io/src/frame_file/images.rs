@@ -66,12 +66,18 @@ fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Resul
     }
     let gamma = if format == ImageFormat::Png { png_gamma(path) } else { None };
     if let (None, Some(gamma)) = (spec.color_space, gamma.filter(|gamma| (gamma - SRGB_GAMMA).abs() > 0.01)) {
-        return Err(unsaid(format!("is missing: {} says that its values are light to the power of {gamma} (gAMA), as sRGB is not: {needed}", path.display())));
+        return Err(unsaid(format!(
+            "is missing: {} says that its values are light to the power of {gamma} (gAMA), as sRGB is not: {needed}",
+            path.display()
+        )));
     }
     let mut notes = Vec::new();
     if let Some(icc) = icc.filter(|icc| !icc.windows(4).any(|part| part == b"sRGB")) {
         let bytes = icc.len();
-        notes.push(format!("{}: its colour profile ({bytes} bytes of ICC) is not applied: values are taken as color_space says", path.display()));
+        notes.push(format!(
+            "{}: its colour profile ({bytes} bytes of ICC) is not applied: values are taken as color_space says",
+            path.display()
+        ));
     }
     if let Some(share) = clear_share(&picture) {
         notes.push(format!("{}: its alpha is not read: {:.1} % of the pixels are not opaque", path.display(), 100.0 * share));

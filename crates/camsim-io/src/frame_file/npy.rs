@@ -29,7 +29,8 @@ pub(super) fn read(path: &Path) -> Result<Option<Array>, FrameFileError> {
     let Ok(()) = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)) else { return Ok(None) };
     let named_npz = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npz"));
     if named_npz || start.starts_with(b"PK\x03\x04") {
-        let of = "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", numpy.load(\"FILE.npz\")[\"NAME\"])`";
+        let of =
+            "is an archive of arrays (.npz): take the array out of it, `numpy.save(\"depth.npy\", numpy.load(\"FILE.npz\")[\"NAME\"])`";
         return Err(failure(path, of));
     }
     if start != *b"\x93NUMPY" {
@@ -41,7 +42,8 @@ pub(super) fn read(path: &Path) -> Result<Option<Array>, FrameFileError> {
 
 fn parse(bytes: &[u8]) -> Result<Array, String> {
     let cut = || "is a .npy file that ends within its header".to_owned();
-    let word = |at: usize, size: usize| bytes.get(at..at + size).map(|b| b.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte)));
+    let word =
+        |at: usize, size: usize| bytes.get(at..at + size).map(|b| b.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte)));
     let (length, from): (usize, usize) = match bytes.get(6).ok_or_else(cut)? {
         1 => (word(8, 2).ok_or_else(cut)?, 10),
         _ => (word(8, 4).ok_or_else(cut)?, 12),
@@ -158,7 +160,12 @@ impl Array {
         let (height, width, apart) = match self.shape[..] {
             [height, width, 2] if height != 2 => (height, width, false),
             [2, height, width] if width != 2 => (height, width, true),
-            _ => return Err(format!("is a .npy file of shape {:?}: a flow is of rows, columns and two numbers, (H, W, 2) or (2, H, W)", self.shape)),
+            _ => {
+                return Err(format!(
+                    "is a .npy file of shape {:?}: a flow is of rows, columns and two numbers, (H, W, 2) or (2, H, W)",
+                    self.shape
+                ));
+            }
         };
         let pixels = height * width;
         let pair = |i: usize| if apart { [i, pixels + i] } else { [2 * i, 2 * i + 1] };

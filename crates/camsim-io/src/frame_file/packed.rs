@@ -33,7 +33,8 @@ pub(super) fn metres(picture: &DynamicImage, format: ImageFormat, packing: Packi
         return Err(failure(path, message));
     }
     if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
-        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
+        let message =
+            "is no 8-bit RGB picture, which depth_encoding = \"packed24\" and \"carla\" are for; leave that key out for 16-bit grey";
         return Err(failure(path, message));
     }
     Ok(picture.to_rgb8().pixels().map(|pixel| packing.metres(pixel.0.map(f64::from))).collect())

@@ -137,7 +137,8 @@ impl FrameSet {
             if let (Some(flow_px), Some(color_px)) = (flow_origin_px, color_origin_px)
                 && flow_px != color_px
             {
-                let message = format!("begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels");
+                let message =
+                    format!("begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels");
                 return Err(failure(path, message));
             }
         }

@@ -120,7 +120,10 @@ fn depth_that_means_nothing_is_refused_and_sky_is_not() {
         (GOOD.replace("1000", "1e300"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "nan"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("depth_per_metre = 1000", "depth_encoding = \"packed24\""), "d.png: is no 8-bit RGB picture"),
-        (format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"), "depth_per_metre: is for numbers; bytes of depth_encoding have their own formula"),
+        (
+            format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"),
+            "depth_per_metre: is for numbers; bytes of depth_encoding have their own formula",
+        ),
     ] {
         fs::write(&path, &text).unwrap();
         let error = read_frame(&path).unwrap_err().to_string();

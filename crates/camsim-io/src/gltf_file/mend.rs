@@ -45,7 +45,9 @@ fn drop_channels(json: &mut Value, notes: &mut Vec<String>) {
         let before = channels.len();
         let moves = |channel: &Value| {
             let target = channel.get("target");
-            target.is_none_or(|target| target.get("node").is_some_and(|node| !node.is_null()) && target.get("path") != Some(&json!("pointer")))
+            target.is_none_or(|target| {
+                target.get("node").is_some_and(|node| !node.is_null()) && target.get("path") != Some(&json!("pointer"))
+            })
         };
         channels.retain(moves);
         let left_out = before - channels.len();

@@ -65,7 +65,11 @@ pub(super) const EXTENSIONS: &[Treatment] = &[
 pub(super) const PROPERTIES: &[Treatment] = &[
     ("baseColorFactor, baseColorTexture", Applied, "albedo"),
     ("COLOR_0", Applied, "times albedo; not under a picture of emitted light that lies on the base colour's, which is named"),
-    ("emissiveFactor, emissiveTexture", Applied, "added, whichever set of texture coordinates it has; what cannot be is named with its material"),
+    (
+        "emissiveFactor, emissiveTexture",
+        Applied,
+        "added, whichever set of texture coordinates it has; what cannot be is named with its material",
+    ),
     ("alphaMode, alphaCutoff", Applied, "masks cut, blended surfaces are mixed"),
     ("doubleSided", Applied, "one-sided surfaces are not there from behind"),
     ("TEXCOORD_n, texCoord", Applied, "any set"),
@@ -147,10 +151,16 @@ pub(super) fn notes(json: &Value) -> Vec<String> {
         for primitive in list(mesh, "primitives") {
             let attributes = primitive.get("attributes").and_then(Value::as_object).into_iter().flatten();
             let more = attributes.filter(|(name, _)| name.starts_with("COLOR_") && *name != "COLOR_0");
-            notes.extend(more.map(|(name, _)| format!("meshes.{number}: {name} is left out: COLOR_0 is the only colour that glTF has a meaning for")));
+            notes.extend(
+                more.map(|(name, _)| {
+                    format!("meshes.{number}: {name} is left out: COLOR_0 is the only colour that glTF has a meaning for")
+                }),
+            );
             let targets = list(primitive, "targets").iter().filter_map(Value::as_object).flatten();
             let other = targets.filter(|(name, _)| !matches!(name.as_str(), "POSITION" | "NORMAL" | "TANGENT"));
-            notes.extend(other.map(|(name, _)| format!("meshes.{number}: {name} of its morph targets is left out: they move and turn corners")));
+            notes.extend(
+                other.map(|(name, _)| format!("meshes.{number}: {name} of its morph targets is left out: they move and turn corners")),
+            );
         }
     }
     notes

@@ -145,7 +145,11 @@ fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
         names.iter().find_map(|name| header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)))
     };
     let Some(color_at) = place(&["color", "color_exr", "color_png"]) else {
-        return Err(row(path, Some(1), "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, depth"));
+        return Err(row(
+            path,
+            Some(1),
+            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, depth",
+        ));
     };
     let depth_at = place(&["depth"]);
     let time_at = time_of(&header).map_err(|message| row(path, Some(1), message))?;
@@ -156,7 +160,8 @@ fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
     // camsim's own tables tell more than is needed here.
     let is_own = place(&["frame"]).is_some() && place(&["stamp_ns"]).is_some();
     let read = [Some(color_at), depth_at, time_at.map(|(at, _)| at), place(&["frame"])];
-    let unread: Vec<&str> = header.iter().enumerate().filter(|(at, _)| !is_own && !read.contains(&Some(*at))).map(|(_, cell)| cell).collect();
+    let unread: Vec<&str> =
+        header.iter().enumerate().filter(|(at, _)| !is_own && !read.contains(&Some(*at))).map(|(_, cell)| cell).collect();
     let notes = match unread[..] {
         [] => Vec::new(),
         _ => vec![format!("{}: the columns {} are not read: frames are of t_s, color and depth", path.display(), unread.join(", "))],

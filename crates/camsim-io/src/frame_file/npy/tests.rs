@@ -71,7 +71,8 @@ fn what_is_no_picture_is_named() {
         let message = parse(&file).unwrap_err();
         assert!(message.contains(wanted), "{message}\n  not {wanted}");
     }
-    let structured = [b"\x93NUMPY\x01\x00\x3a\x00".as_slice(), b"{'descr': [('z', '<f4')], 'fortran_order': False, 'shape': (2,)}"].concat();
+    let structured =
+        [b"\x93NUMPY\x01\x00\x3a\x00".as_slice(), b"{'descr': [('z', '<f4')], 'fortran_order': False, 'shape': (2,)}"].concat();
     assert!(parse(&structured).unwrap_err().contains("has no descr"));
     let plane = |shape: &[usize]| Array { shape: shape.to_vec(), values: Vec::new(), whole: false }.plane();
     assert_eq!([plane(&[4, 5]), plane(&[4, 5, 1]), plane(&[1, 4, 5])], [Ok([5, 4]), Ok([5, 4]), Ok([5, 4])]);

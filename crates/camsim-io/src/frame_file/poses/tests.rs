@@ -11,7 +11,8 @@ fn read(text: &str, format: TrajectoryFormat, base_s: f64) -> Result<(Vec<PoseRo
 
 /// The first row as t, position and quaternion w, x, y, z.
 fn first(text: &str, format: TrajectoryFormat) -> [f64; 8] {
-    let PoseRow { t_s, position_m: p, world_from_camera: q } = read(text, format, 0.0).unwrap_or_else(|error| panic!("{text}\n{error}")).0[0];
+    let PoseRow { t_s, position_m: p, world_from_camera: q } =
+        read(text, format, 0.0).unwrap_or_else(|error| panic!("{text}\n{error}")).0[0];
     [t_s, p.x, p.y, p.z, q.w, q.x, q.y, q.z]
 }
 
