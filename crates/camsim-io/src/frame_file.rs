@@ -55,7 +55,7 @@ use thiserror::Error;
 
 use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
-mod columns;
+pub(crate) mod columns;
 mod depth;
 mod exr_planes;
 mod floats;

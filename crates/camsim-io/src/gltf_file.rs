@@ -10,7 +10,7 @@ use std::{
     sync::Arc,
 };
 
-use camsim_core::scene::{Material, Mesh, Shape};
+use camsim_core::scene::{Material, Mesh, Shape, Texture, Wrap};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
@@ -24,6 +24,7 @@ mod primitive;
 mod source;
 mod treatments;
 
+use emitted::Bake;
 use material::Materials;
 use pose::Pose;
 use source::Source;
@@ -146,6 +147,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         source: &source,
         options,
         shapes: HashMap::new(),
+        baked: HashMap::new(),
         parts: Vec::new(),
         met: HashSet::new(),
         notes: Vec::new(),
@@ -182,6 +184,8 @@ struct Reader<'a> {
     materials: Materials<'a>,
     /// By mesh, primitive and whether it is mirrored: those that no node changes.
     shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
+    /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture, or that there is none.
+    baked: HashMap<(usize, usize, bool), Option<(Arc<Shape>, Arc<Texture>)>>,
     parts: Vec<Part>,
     /// Nodes that have been met: a tree comes by each of them once.
     met: HashSet<usize>,
@@ -237,31 +241,45 @@ impl Reader<'_> {
                 let (number, set) = (mesh.index(), uv.set);
                 self.notes.push(format!("meshes.{number}: has no TEXCOORD_{set} for its picture to lie by: one texel of it is all over"));
             }
-            let shape = match self.shapes.get(&key).filter(|_| !own) {
-                Some(shape) => shape.clone(),
-                None => {
-                    let beyond = Cell::new(false);
-                    let made = primitive::Making {
-                        source: self.source,
-                        mesh,
-                        triangles,
-                        mirrored,
-                        uv: &uv,
-                        weights: &weights,
-                        joints: joints.as_deref(),
-                        normals: self.options.normals && uv.takes_light,
-                        beyond: &beyond,
-                    };
-                    let shape = made.shape(&primitive)?;
-                    if beyond.get() {
-                        let number = mesh.index();
-                        self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
+            let beyond = Cell::new(false);
+            let made = primitive::Making {
+                source: self.source,
+                mesh,
+                triangles,
+                mirrored,
+                uv: &uv,
+                weights: &weights,
+                joints: joints.as_deref(),
+                normals: self.options.normals && uv.takes_light,
+                beyond: &beyond,
+            };
+            let baked = match self.materials.bake_of(&primitive.material()) {
+                None => None,
+                Some(bake) => match self.baked.get(&key).filter(|_| !own) {
+                    Some(known) => known.clone(),
+                    None => {
+                        let found = self.bake(&made, &primitive, &bake)?;
+                        if !own {
+                            self.baked.insert(key, found.clone());
+                        }
+                        found
                     }
-                    Arc::new(shape)
+                },
+            };
+            let (shape, material) = match (baked, self.shapes.get(&key).filter(|_| !own)) {
+                (Some((shape, texture)), _) => (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material }),
+                (None, Some(shape)) => (shape.clone(), material),
+                (None, None) => {
+                    let shape = Arc::new(made.shape(&primitive)?);
+                    if !own {
+                        self.shapes.insert(key, shape.clone());
+                    }
+                    (shape, material)
                 }
             };
-            if !own {
-                self.shapes.insert(key, shape.clone());
+            if beyond.get() {
+                let number = mesh.index();
+                self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
             }
             let corner_m =
                 shape.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length()).fold(0.0, f64::max);
@@ -280,6 +298,35 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A shape under one picture of its base colour and its emitted light, which lie in different ways on it.
+    fn bake(
+        &mut self,
+        made: &primitive::Making<'_>,
+        primitive: &gltf::Primitive<'_>,
+        of: &Bake,
+    ) -> Result<Option<(Arc<Shape>, Arc<Texture>)>, GltfError> {
+        // What has emitted light on top is not lit: one picture cannot hold both.
+        let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
+        let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;
+        let name = self.source.material_name(primitive.material().index());
+        let Some(emitted::Baked { shape, texture, coarser }) = emitted::bake(&shape, &light_uvs, of) else {
+            self.notes.push(format!(
+                "{name}: its picture of emitted light is left out: it lies otherwise than the base colour, and in neither layout each place of the surface has a place of \
+                 its own; give it the base colour's texture coordinates"
+            ));
+            return Ok(None);
+        };
+        if coarser > 1.25 {
+            self.notes.push(format!(
+                "{name}: base colour and emitted light lie in different ways, and are shown {coarser:.1} times coarser than they are"
+            ));
+        }
+        if self.options.normals {
+            self.notes.push("what has a picture of emitted light keeps its colours: light does not fall on it".into());
+        }
+        Ok(Some((Arc::new(shape), Arc::new(texture))))
     }
 }
 

@@ -9,6 +9,7 @@ use camsim_core::{
 };
 use camsim_io::{
     frame_file::{FrameFile, FrameSet, read_frame_set},
+    load::vignette_warnings,
     pictures::read_gray_image,
     scenario_file::read_checked_camera,
     write::write_picture,
@@ -139,6 +140,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let set = read_frame_set(&args.frame).or_bad_input()?;
     set.notes().iter().for_each(|note| console.warn(note));
     let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;
+    vignette.iter().flat_map(|map| vignette_warnings(&spec, map)).for_each(|warning| console.warn(warning));
     if set.is_several() {
         return folder::run(args, &spec, &set, vignette.as_ref(), console);
     }

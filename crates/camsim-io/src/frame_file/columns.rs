@@ -2,14 +2,14 @@
 
 /// A time or a length by its name: `t_s`, `t_ms`, `timestamp [ns]`, `x`, `x_mm`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Unit {
+pub(crate) struct Unit {
     /// Seconds or metres of one of them.
     pub factor: f64,
 }
 
 /// What a column is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Column {
+pub(crate) enum Column {
     /// Seconds are the numbers times this; `None` if the name has no unit.
     Time(Option<Unit>),
     /// x, y, z of the position; metres are the numbers times this.
@@ -42,7 +42,7 @@ const LENGTHS: &[(&str, f64)] = &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km",
 const TIME_NAMES: &[&str] = &["t", "time", "timestamp", "stamp"];
 
 /// What a header's cell names.
-pub(super) fn column(cell: &str) -> Column {
+pub(crate) fn column(cell: &str) -> Column {
     let cell = cell.trim_start_matches('\u{feff}').trim().trim_matches('"').trim().to_lowercase();
     let (name, unit) = split(&cell);
     let factor = |units: &[(&str, f64)]| units.iter().find(|(known, _)| Some(*known) == unit).map(|(_, factor)| Unit { factor: *factor });

@@ -61,7 +61,8 @@ pub(super) const EXTENSIONS: &[Treatment] = &[
     ("MSFT_lod", NoMatter, "the finest level is shown"),
 ];
 
-/// Properties of glTF 2.0 itself that change the picture, or look as if they did.
+/// Properties of glTF 2.0 itself that change the picture, or look as if they did: for the page.
+#[cfg(test)]
 pub(super) const PROPERTIES: &[Treatment] = &[
     ("baseColorFactor, baseColorTexture", Applied, "albedo"),
     ("COLOR_0", Applied, "times albedo; not under a picture of emitted light that lies on the base colour's, which is named"),
