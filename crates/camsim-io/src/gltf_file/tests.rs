@@ -5,6 +5,7 @@ use glam::DVec2;
 
 use super::*;
 
+mod extensions;
 mod malformed;
 
 fn data() -> Option<PathBuf> {

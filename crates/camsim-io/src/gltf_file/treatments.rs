@@ -32,7 +32,7 @@ pub(super) const EXTENSIONS: &[Treatment] = &[
     ("KHR_mesh_quantization", Applied, "positions, normals and texture coordinates of 8 and 16 bits"),
     ("KHR_texture_transform", Applied, "offset, rotation, scale and set of texture coordinates"),
     ("KHR_materials_unlit", Applied, "the scene's light does not fall on it"),
-    ("KHR_materials_pbrSpecularGlossiness", Applied, "its diffuse colour is the base colour; gloss is left out"),
+    ("KHR_materials_pbrSpecularGlossiness", Applied, "its diffuse colour is the base colour; its gloss is named"),
     ("KHR_materials_emissive_strength", Applied, "times emissiveFactor; more than white is white, and named"),
     ("KHR_node_visibility", Applied, "of what is not visible nothing is shown, its children included"),
     ("EXT_mesh_gpu_instancing", Applied, "TRANSLATION, ROTATION and SCALE"),
@@ -175,7 +175,10 @@ fn albedo_only(json: &Value) -> BTreeSet<&str> {
             continue;
         }
         let there = |pointer: &str| material.pointer(pointer).is_some_and(|value| !value.is_null());
+        let older = |key: &str| there(&format!("/extensions/KHR_materials_pbrSpecularGlossiness/{key}"));
         let names = [
+            ("specularFactor", older("specularFactor")),
+            ("specularGlossinessTexture", older("specularGlossinessTexture")),
             ("normalTexture", there("/normalTexture")),
             ("occlusionTexture", there("/occlusionTexture")),
             ("metallicRoughnessTexture", there("/pbrMetallicRoughness/metallicRoughnessTexture")),

@@ -273,7 +273,7 @@ fn render(
             let (file, what) = note.split_once(": ").unwrap_or(("", note));
             let kind = what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
             if !told.contains(&kind) {
-                console.warn(format_args!("{file}: {what}; others are not told of"));
+                console.warn(format_args!("{file}: {what} (others like it are not told of)"));
                 told.push(kind);
             }
         }

@@ -5,18 +5,18 @@ use serde_json::{Value, json};
 use super::*;
 
 /// A square with a picture, vertex colours and indices, in one buffer.
-struct Good {
-    json: Value,
-    bytes: Vec<u8>,
+pub(super) struct Good {
+    pub json: Value,
+    pub bytes: Vec<u8>,
 }
 
-fn png(width: u32, height: u32) -> Vec<u8> {
+pub(super) fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::RgbImage::new(width, height).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
-fn good(picture: &[u8]) -> Good {
+pub(super) fn good(picture: &[u8]) -> Good {
     let parts = [
         floats(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0, 2.0, 0.0]),
         floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
@@ -47,7 +47,7 @@ fn good(picture: &[u8]) -> Good {
 }
 
 impl Good {
-    fn read(&self) -> Result<Model, String> {
+    pub fn read(&self) -> Result<Model, String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
         let path = folder.path().join("model.gltf");
@@ -58,7 +58,7 @@ impl Good {
 }
 
 /// Reads the good model with `value` at each of these places; null takes out what is there.
-fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
+pub(super) fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
     let mut good = good(&png(4, 4));
     for (pointer, value) in changes {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
