@@ -177,6 +177,9 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     Ok(Model { parts, notes, reach_m })
 }
 
+/// A shape, and the picture of its base colour and its emitted light.
+type BakedPart = (Arc<Shape>, Arc<Texture>);
+
 struct Reader<'a> {
     source: &'a Source,
     options: GltfOptions,
@@ -185,7 +188,7 @@ struct Reader<'a> {
     /// By mesh, primitive and whether it is mirrored: those that no node changes.
     shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
     /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture, or that there is none.
-    baked: HashMap<(usize, usize, bool), Option<(Arc<Shape>, Arc<Texture>)>>,
+    baked: HashMap<(usize, usize, bool), Option<BakedPart>>,
     parts: Vec<Part>,
     /// Nodes that have been met: a tree comes by each of them once.
     met: HashSet<usize>,
@@ -301,12 +304,7 @@ impl Reader<'_> {
     }
 
     /// A shape under one picture of its base colour and its emitted light, which lie in different ways on it.
-    fn bake(
-        &mut self,
-        made: &primitive::Making<'_>,
-        primitive: &gltf::Primitive<'_>,
-        of: &Bake,
-    ) -> Result<Option<(Arc<Shape>, Arc<Texture>)>, GltfError> {
+    fn bake(&mut self, made: &primitive::Making<'_>, primitive: &gltf::Primitive<'_>, of: &Bake) -> Result<Option<BakedPart>, GltfError> {
         // What has emitted light on top is not lit: one picture cannot hold both.
         let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
         let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;

@@ -92,7 +92,8 @@ impl<'a> Materials<'a> {
         let emitted_key = if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
         self.check_factors(material, [(key, &factor), (emitted_key, &emitted)])?;
         let emitted = emitted.map(|part| part.clamp(0.0, 1.0));
-        let emits = emitted.iter().any(|&part| part > 0.0);
+        // What is unlit has its base colour alone, by the definition of that.
+        let emits = !material.unlit() && emitted.iter().any(|&part| part > 0.0);
         // Alpha is the base colour's, black or not.
         let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
         let black = factor[..3].iter().all(|&part| part == 0.0) && !(has_alpha && base_texture.is_some());

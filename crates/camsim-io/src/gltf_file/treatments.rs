@@ -31,7 +31,7 @@ const AS_PNG: &str = "write its pictures as PNG or JPEG";
 pub(super) const EXTENSIONS: &[Treatment] = &[
     ("KHR_mesh_quantization", Applied, "positions, normals and texture coordinates of 8 and 16 bits"),
     ("KHR_texture_transform", Applied, "offset, rotation, scale and set of texture coordinates"),
-    ("KHR_materials_unlit", Applied, "the scene's light does not fall on it"),
+    ("KHR_materials_unlit", Applied, "its base colour alone: the scene's light does not fall on it, and nothing is emitted"),
     ("KHR_materials_pbrSpecularGlossiness", Applied, "its diffuse colour is the base colour; its gloss is named"),
     ("KHR_materials_emissive_strength", Applied, "times emissiveFactor; more than white is white, and named"),
     ("KHR_node_visibility", Applied, "of what is not visible nothing is shown, its children included"),

@@ -86,6 +86,9 @@ fn emitted_light_has_its_strength_and_more_than_white_is_white() {
         (emissive, model.notes)
     };
     assert_eq!(of(0.25, 2.0), ([0.5, 0.0, 0.0], Vec::new()));
+    // What is unlit has its base colour alone.
+    let unlit = [("/materials/0/emissiveFactor", json!([1, 1, 1])), (EXTENSIONS, json!({ "KHR_materials_unlit": {} }))];
+    assert_eq!(with(&unlit).unwrap().parts[0].material.emissive, [0.0; 3]);
     let (emissive, notes) = of(1.0, 5.0);
     assert_eq!(emissive, [1.0, 0.0, 0.0]);
     assert!(notes.len() == 1 && notes[0].contains("materials.0: emissiveFactor times emissiveStrength is [5.0, 0.0, 0.0]"), "{notes:?}");
@@ -213,4 +216,17 @@ fn light_that_cannot_be_brought_together_names_its_material() {
     let found = model.read().unwrap();
     let named = found.notes.len() == 1 && found.notes[0].starts_with("materials.0 (lamp): its picture of emitted light is left out");
     assert!(named && found.parts[0].material.texture.size_px == [8, 8], "{:?}", found.notes);
+}
+
+#[test]
+fn notes_of_real_models_are_few_and_tell_of_what_is_in_them() {
+    let Some(data) = data() else { return };
+    let known =
+        ["colour is albedo alone: ", "has animations, and no time_s", "points and lines are not shown", "has no triangles", "has no scene"];
+    for path in all_models(&data) {
+        let Ok(model) = read_gltf(&path, GltfOptions::default()) else { continue };
+        eprintln!("{}: {} triangles, {:?}", path.display(), model.triangles(), model.notes);
+        assert!(model.notes.len() <= 2, "{}: {:?}", path.display(), model.notes);
+        assert!(model.notes.iter().all(|note| known.iter().any(|known| note.starts_with(known))), "{}: {:?}", path.display(), model.notes);
+    }
 }
