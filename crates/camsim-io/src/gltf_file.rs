@@ -94,6 +94,8 @@ struct Part {
 /// From a model's axes (x left, y up, z ahead) to forward, right, down.
 const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
 
+/// Texels that are made where base colour and emitted light lie in different ways, at most: half a gigabyte.
+const MOST_BAKED: usize = 1 << 27;
 /// Parts of a scene, at most: a slip in a number must not fill the memory.
 const MOST_PARTS: usize = 1 << 20;
 /// No point of a model is farther from its origin, metres: what claims to be is a slip in a number.
@@ -148,6 +150,7 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         options,
         shapes: HashMap::new(),
         baked: HashMap::new(),
+        texels_left: MOST_BAKED,
         parts: Vec::new(),
         met: HashSet::new(),
         notes: Vec::new(),
@@ -189,6 +192,8 @@ struct Reader<'a> {
     shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
     /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture, or that there is none.
     baked: HashMap<(usize, usize, bool), Option<BakedPart>>,
+    /// Texels that further ones may have.
+    texels_left: usize,
     parts: Vec<Part>,
     /// Nodes that have been met: a tree comes by each of them once.
     met: HashSet<usize>,
@@ -309,13 +314,14 @@ impl Reader<'_> {
         let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
         let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;
         let name = self.source.material_name(primitive.material().index());
-        let Some(emitted::Baked { shape, texture, coarser }) = emitted::bake(&shape, &light_uvs, of) else {
+        let Some(emitted::Baked { shape, texture, coarser }) = emitted::bake(&shape, &light_uvs, of, self.texels_left) else {
             self.notes.push(format!(
                 "{name}: its picture of emitted light is left out: it lies otherwise than the base colour, and in neither layout each place of the surface has a place of \
-                 its own; give it the base colour's texture coordinates"
+                 its own, or one picture of both would be too large; give it the base colour's texture coordinates"
             ));
             return Ok(None);
         };
+        self.texels_left -= texture.rgba8.len() / 4;
         if coarser > 1.25 {
             self.notes.push(format!(
                 "{name}: base colour and emitted light lie in different ways, and are shown {coarser:.1} times coarser than they are"

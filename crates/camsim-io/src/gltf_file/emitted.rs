@@ -86,7 +86,7 @@ pub(super) struct Bake {
 
 /// Texels of a side, and of a picture, that a bake may have.
 const MOST_SIDE: usize = 8192;
-const MOST_TEXELS: usize = 1 << 25;
+const MOST_TEXELS: usize = 1 << 24;
 /// Parts of a layout's texel that a bake may have along a side.
 const FINEST: f64 = 8.0;
 /// Share of the texels that two triangles may disagree about: those along their edges.
@@ -102,20 +102,22 @@ pub(super) struct Baked {
     pub coarser: f64,
 }
 
-/// Brings both pictures into the layout of one of them, in which each place of the surface has a place of its own: `None` where neither has.
-pub(super) fn bake(shape: &Shape, light_uvs: &[[f32; 2]], of: &Bake) -> Option<Baked> {
+/// Brings both pictures into the layout of one of them, in which each place of the surface has a place of its own: `None` where neither has, or
+/// where that takes more than `most_texels`.
+pub(super) fn bake(shape: &Shape, light_uvs: &[[f32; 2]], of: &Bake, most_texels: usize) -> Option<Baked> {
     let base_uvs: Vec<[f32; 2]> = shape.vertices.iter().map(|vertex| vertex.uv).collect();
     let layout = |uvs: &[[f32; 2]], by: &Layer| {
         uvs.iter().map(|uv| [0, 1].map(|k: usize| f64::from(uv[k]) * f64::from(by.texture.size_px[k]))).collect()
     };
     let (base, light): (Vec<_>, Vec<_>) = (layout(&base_uvs, &of.base), layout(light_uvs, &of.light));
-    in_layout(shape, &light, &base, &base, &light, of).or_else(|| in_layout(shape, &base, &light, &base, &light, of))
+    let most = most_texels.min(MOST_TEXELS);
+    in_layout(shape, [&light, &base], [&base, &light], of, most).or_else(|| in_layout(shape, [&base, &light], [&base, &light], of, most))
 }
 
 /// Texel coordinates of each corner.
 type Texels = [[f64; 2]];
 
-fn in_layout(shape: &Shape, layout: &Texels, other: &Texels, base: &Texels, light: &Texels, of: &Bake) -> Option<Baked> {
+fn in_layout(shape: &Shape, [layout, other]: [&Texels; 2], [base, light]: [&Texels; 2], of: &Bake, most_texels: usize) -> Option<Baked> {
     let wanted = triangles(shape)
         .map(|corners| finer(corners.map(|i| layout[i]), corners.map(|i| other[i])))
         .try_fold(1.0_f64, |most, ratio| ratio.map(|ratio| most.max(ratio)))?;
@@ -123,7 +125,7 @@ fn in_layout(shape: &Shape, layout: &Texels, other: &Texels, base: &Texels, ligh
     let mut parts = (wanted - 0.05).ceil().clamp(1.0, FINEST);
     // A texel more on each side, for what lies on the border.
     let size = |parts: f64| [0, 1].map(|k: usize| (((high[k] - low[k]) + 2.0) * parts) as usize);
-    let fits = |[w, h]: [usize; 2]| w <= MOST_SIDE && h <= MOST_SIDE && w.saturating_mul(h) <= MOST_TEXELS;
+    let fits = |[w, h]: [usize; 2]| w <= MOST_SIDE && h <= MOST_SIDE && w.saturating_mul(h) <= most_texels;
     while !fits(size(parts)) {
         parts -= 1.0;
         if parts < 1.0 {
@@ -244,18 +246,22 @@ impl Canvas {
     /// What no triangle covers is as the nearest that one does: reads at borders and from smaller versions take it in.
     fn finish(mut self) -> Texture {
         let [width, height] = self.size;
-        let mut front: Vec<usize> = (0..self.rgba8.len()).filter(|&at| self.is_covered[at]).collect();
+        let beside = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let of = [
+                (x > 0).then(|| at - 1),
+                (x + 1 < width).then_some(at + 1),
+                (y > 0).then(|| at - width),
+                (y + 1 < height).then_some(at + width),
+            ];
+            of.into_iter().flatten()
+        };
+        let is_border = |at: usize| self.is_covered[at] && beside(at).any(|to| !self.is_covered[to]);
+        let mut front: Vec<usize> = (0..self.rgba8.len()).filter(|&at| is_border(at)).collect();
         while !front.is_empty() {
             let mut next = Vec::new();
             for at in front {
-                let (x, y) = (at % width, at / width);
-                let beside = [
-                    (x > 0).then(|| at - 1),
-                    (x + 1 < width).then_some(at + 1),
-                    (y > 0).then(|| at - width),
-                    (y + 1 < height).then_some(at + width),
-                ];
-                for to in beside.into_iter().flatten() {
+                for to in beside(at) {
                     if !self.is_covered[to] {
                         self.is_covered[to] = true;
                         self.rgba8[to] = self.rgba8[at];

@@ -78,7 +78,7 @@ fn light_in_a_layout_of_its_own_is_added_where_it_lies() {
     shape.vertices[1].tint = [1.0, 0.0, 1.0, 1.0];
     shape.vertices[3].tint = [1.0, 0.0, 1.0, 1.0];
     let of = Bake { base: waves(16, 1, 1.0), light: waves(32, 0, 1.0), emitted: [0.5; 3] };
-    let baked = bake(&shape, &light_uvs, &of).unwrap();
+    let baked = bake(&shape, &light_uvs, &of, MOST_TEXELS).unwrap();
     assert!(baked.coarser <= 1.05, "{}", baked.coarser);
     assert!(baked.shape.vertices.iter().all(|vertex| vertex.tint == [1.0; 4]));
     for i in 1..20 {
@@ -97,7 +97,7 @@ fn where_the_light_repeats_the_layout_of_the_base_is_taken() {
     // All of the light's picture is on each of the two triangles.
     light_uvs[3] = [0.0, 0.0];
     let of = Bake { base: waves(16, 1, 1.0), light: waves(16, 0, 1.0), emitted: [1.0; 3] };
-    let baked = bake(&shape, &light_uvs, &of).unwrap();
+    let baked = bake(&shape, &light_uvs, &of, MOST_TEXELS).unwrap();
     // A place of the first triangle, and one of the second: there u is 1 - y.
     assert!((shown(&baked, 0.25, 0.25)[0] - of.light.at([0.25, 0.25])[0]).abs() < 0.02);
     assert!(
@@ -117,9 +117,15 @@ fn what_lies_on_itself_in_both_layouts_is_not_baked() {
     light_uvs[3] = [0.0, 0.0];
     light_uvs.swap(0, 1);
     let of = Bake { base: waves(16, 1, 1.0), light: waves(16, 0, 1.0), emitted: [1.0; 3] };
-    assert!(bake(&shape, &light_uvs, &of).is_none());
+    assert!(bake(&shape, &light_uvs, &of, MOST_TEXELS).is_none());
+    // What would be too large is coarser, and at last not there.
+    let (shape, light_uvs) = square(4.0);
+    let of = Bake { base: waves(64, 1, 1.0), light: waves(16, 0, 1.0), emitted: [1.0; 3] };
+    let sizes = [1 << 20, 18 * 18 * 16, 10]
+        .map(|most| bake(&shape, &light_uvs, &of, most).map(|baked| (baked.texture.size_px, baked.coarser.round())));
+    assert_eq!(sizes, [Some(([144, 144], 2.0)), Some(([72, 72], 4.0)), None]);
     // A layout without area shows one texel all over: there is nothing to lay the other by, but the other has a place for everything.
     let (shape, _) = square(1.0);
-    let baked = bake(&shape, &[[0.25, 0.5]; 4], &of).unwrap();
+    let baked = bake(&shape, &[[0.25, 0.5]; 4], &of, MOST_TEXELS).unwrap();
     assert!((shown(&baked, 0.9, 0.4)[0] - of.light.at([0.25, 0.5])[0]).abs() < 0.01);
 }
