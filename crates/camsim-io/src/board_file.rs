@@ -56,41 +56,77 @@ pub fn read_target(path: &Path) -> Result<BoardSpec, BoardFileError> {
     parse(&document.value).map_err(|problem| wrong(format!("{} {}", problem.key, problem.message)))
 }
 
+/// Keys of each kind of target; what is not here would be something that nobody sees in the picture.
+const KEYS: &[(&str, &[&str])] = &[
+    ("aprilgrid", &["tagCols", "tagRows", "tagSize", "tagSpacing"]),
+    ("checkerboard", &["targetCols", "targetRows", "rowSpacingMeters", "colSpacingMeters"]),
+    ("circlegrid", &["targetCols", "targetRows", "spacingMeters", "asymmetricGrid"]),
+];
+/// No square, tag or gap that was held before a camera is as large, metres.
+const LARGEST_M: f64 = 10.0;
+
 fn parse(value: &Value) -> Result<BoardSpec, Problem> {
     let count = |key: &str| {
         let n = number(value, key)?;
         let whole = n.fract() == 0.0 && (1.0..=1e4).contains(&n);
         if whole { Ok(Some(n as u32)) } else { Err(Problem::new(key, format!("is {n}, not a number of squares, circles or tags"))) }
     };
-    match word(value, "target_type") {
-        Some("aprilgrid") => Ok(BoardSpec {
+    let in_metres = |key: &str, size: f64| {
+        let fix = "targets of Kalibr's are in metres: if these are millimetres divide them by 1000; a board as large is described with scene.board's own keys";
+        if size < LARGEST_M { Ok(size) } else { Err(Problem::new(key, format!("is {size} m: {fix}"))) }
+    };
+    let metres = |key: &str| number(value, key).and_then(|size| in_metres(key, size));
+    let kind = match word(value, "target_type") {
+        Some(kind) => kind,
+        // Basalt's files leave it out.
+        None if find(value, "tagCols").is_some() => "aprilgrid",
+        None => return Err(Problem::new("target_type", "is missing: this is no target of Kalibr's")),
+    };
+    let Some((_, keys)) = KEYS.iter().find(|(known, _)| *known == kind) else {
+        return Err(Problem::new("target_type", format!("is `{kind}`: `aprilgrid`, `checkerboard` and `circlegrid` are known")));
+    };
+    let known = |key: &str| key == "target_type" || keys.contains(&key);
+    if let Some(key) = value.as_object().and_then(|map| map.keys().find(|key| !known(key))) {
+        let fix = format!(
+            "is no key of a target of type `{kind}`, which has {}: leave it out, or describe the board with scene.board's own keys",
+            keys.join(", ")
+        );
+        return Err(Problem::new(key.clone(), fix));
+    }
+    match kind {
+        "aprilgrid" => Ok(BoardSpec {
             kind: Some(BoardKind::Aprilgrid),
             columns: count("tagCols")?,
             rows: count("tagRows")?,
-            size_m: Some(number(value, "tagSize")?),
+            size_m: Some(metres("tagSize")?),
             spacing: Some(number(value, "tagSpacing")?),
             ..BoardSpec::default()
         }),
-        Some("checkerboard") => Ok(BoardSpec {
+        "checkerboard" => Ok(BoardSpec {
             kind: Some(BoardKind::Chessboard),
             columns: count("targetCols")?,
             rows: count("targetRows")?,
-            size_m: Some(number(value, "colSpacingMeters")?),
-            row_size_m: optional_number(value, "rowSpacingMeters")?,
+            size_m: Some(metres("colSpacingMeters")?),
+            row_size_m: optional_number(value, "rowSpacingMeters")?.map(|size| in_metres("rowSpacingMeters", size)).transpose()?,
             ..BoardSpec::default()
         }),
-        Some("circlegrid") => {
-            let asymmetric = find(value, "asymmetricGrid").is_some_and(|flag| flag.as_bool() == Some(true) || flag.as_i64() == Some(1));
-            Ok(BoardSpec {
-                kind: Some(if asymmetric { BoardKind::AsymmetricCircles } else { BoardKind::Circles }),
-                columns: count("targetCols")?,
-                rows: count("targetRows")?,
-                size_m: Some(number(value, "spacingMeters")?),
-                ..BoardSpec::default()
-            })
-        }
-        Some(other) => Err(Problem::new("target_type", format!("is `{other}`: `aprilgrid`, `checkerboard` and `circlegrid` are known"))),
-        None => Err(Problem::new("target_type", "is missing: this is no target of Kalibr's")),
+        _ => Ok(BoardSpec {
+            kind: Some(if is_asymmetric(value)? { BoardKind::AsymmetricCircles } else { BoardKind::Circles }),
+            columns: count("targetCols")?,
+            rows: count("targetRows")?,
+            size_m: Some(metres("spacingMeters")?),
+            ..BoardSpec::default()
+        }),
+    }
+}
+
+/// `asymmetricGrid`, which is false if left out.
+fn is_asymmetric(value: &Value) -> Result<bool, Problem> {
+    let Some(found) = find(value, "asymmetricGrid") else { return Ok(false) };
+    match (found.as_bool(), found.as_i64()) {
+        (Some(flag), _) => Ok(flag),
+        (_, Some(flag @ (0 | 1))) => Ok(flag == 1),
+        _ => Err(Problem::new("asymmetricGrid", format!("is {found}: give True or False"))),
     }
 }
 
@@ -136,17 +172,37 @@ mod tests {
         ] {
             assert_eq!(read(text).unwrap(), Board::from_spec(&spec).unwrap(), "{text}");
         }
+        let of_basalt = "{ \"tagCols\": 6, \"tagRows\": 6, \"tagSize\": 0.088, \"tagSpacing\": 0.3 }";
+        let expected = BoardSpec { spacing: Some(0.3), ..board(BoardKind::Aprilgrid, 6, 6, 0.088) };
+        assert_eq!(read(of_basalt).unwrap(), Board::from_spec(&expected).unwrap());
     }
 
     #[test]
     fn what_is_no_target_is_named() {
         for (text, wanted) in [
-            ("tagCols: 6\n", "target_type is missing"),
+            ("tagCols: 6\n", "tagRows is missing"),
             ("target_type: 'dots'\n", "target_type is `dots`"),
             ("target_type: 'aprilgrid'\ntagRows: 6\n", "tagCols is missing"),
             ("target_type: 'aprilgrid'\ntagCols: 6.5\ntagRows: 6\n", "tagCols is 6.5"),
             ("target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 600\ntagSize: 1\ntagSpacing: 0.3\n", "rows is 600"),
             ("target_type: [", "target.yaml"),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 88\ntagSpacing: 0.3\n",
+                "tagSize is 88 m: targets of Kalibr's are in metres",
+            ),
+            (
+                "target_type: 'checkerboard'\ntargetCols: 6\ntargetRows: 7\nrowSpacingMeters: 60\ncolSpacingMeters: 0.07\n",
+                "rowSpacingMeters is 60 m",
+            ),
+            (
+                "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.088\ntagSpacing: 0.3\nstartId: 36\n",
+                "startId is no key of a target of type `aprilgrid`",
+            ),
+            (
+                "target_type: 'circlegrid'\ntargetCols: 4\ntargetRows: 5\nspacingMeters: 0.02\nasymmetricGrid: 'yes'\n",
+                "asymmetricGrid is \"yes\": give True or False",
+            ),
+            ("targetCols: 4\ntargetRows: 5\n", "target_type is missing"),
         ] {
             let error = read(text).unwrap_err();
             assert!(error.contains(wanted) && error.contains("target.yaml"), "{error}");

@@ -1,16 +1,17 @@
 //! FRAME.toml: somebody else's ideal RGB-D frame and how its camera moved, for `camsim apply`.
 //!
 //! ```toml
-//! color = "ideal.png"                # EXR (linear), PNG, JPEG, BMP; alpha is not read
-//! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR
+//! color = "ideal.png"                # EXR (linear), PNG, JPEG, BMP, TIFF, WebP; alpha is not read
+//! color_space = "srgb"               # or "linear"; default: srgb, but linear for EXR; TIFF of floats must say
 //! color_channels = ["R", "G", "B"]   # of an EXR, one is grey; a whole name, or the end of one: "Combined.R"
 //! color_layer = "ViewLayer.Combined" # of an EXR: its channels are taken from there
-//! depth = "depth.exr"                # EXR Z, PFM or TIFF of floats in metres, 16-bit PNG, PGM or TIFF with depth_per_metre, or packed24
+//! depth = "depth.exr"                # EXR Z, PFM, TIFF or .npy of floats in metres, 16-bit PNG, PGM, TIFF or whole .npy with depth_per_metre, or packed
 //! depth_channel = "Depth.Z"          # of an EXR, and depth_layer, as above
-//! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes)
-//! depth_per_metre = 1000.0           # stored value of one metre, for whole numbers only: 0.001 to 1e6
+//! depth_encoding = "plain"           # or "packed24", the reference program's: z = 65025 R/255 + 255 G/255 + B/255 (bytes);
+//!                                    # or "carla": z = 1000 (R + 256 G + 65536 B) / (256^3 - 1)
+//! depth_per_metre = 1000.0           # stored value of one metre, 0.001 to 1e6; of floats 1 if left out
 //! depth_rows = "bottom-up"           # of a PFM: the row that it begins with; "top-down" as AirSim writes them
-//! depth_kind = "planar"              # z along the optical axis; or "range", along the ray
+//! depth_kind = "planar"              # z along the optical axis; or "range", along the ray; or "inverse": depth_per_metre / z
 //! depth_max_m = 1e9                  # what is stored as that far, or farther, is no depth: the value that stands for the sky
 //! holes = "far"                      # where there is no depth; "nearest": that of the nearest pixel that has one; "mark": nothing is shown
 //! focal_px = [307.6, 307.6]          # of the ideal frame, which may be larger than the output
@@ -19,8 +20,8 @@
 //! [motion]                           # a twist about the frame's instant, in camera axes ...
 //! velocity_m_s = [0.0, 0.0, 0.0]
 //! angular_rate_rad_s = [0.0, 0.0, 0.628]
-//! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera),
-//! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw without a header
+//! # trajectory = "poses.csv"         # ... or poses: t_s,x,y,z,qw,qx,qy,qz (world_from_camera), units by name: t_ms, x_mm,
+//! # trajectory_format = "csv"        #     or "tum": t x y z qx qy qz qw without a header, or with a comment that names another order
 //! # stamp_s = 12.5                   #     and the stamp on their clock
 //! # flow = "flow.flo"              # ... or where each pixel goes, whatever moves it: Middlebury .flo, or an EXR
 //! # flow_channels = ["X", "Y"]     #     of an EXR with more than two: right and down
@@ -54,15 +55,20 @@ use thiserror::Error;
 
 use crate::scenario_file::{ScenarioError, check, deserialize, tree::Tree};
 
+pub(crate) mod columns;
 mod depth;
 mod exr_planes;
 mod floats;
 mod flow;
 mod images;
 pub mod list;
+mod npy;
+mod packed;
 mod poses;
 mod schema;
 mod set;
+#[cfg(test)]
+mod treatments;
 
 pub use set::{FrameSet, read_frame_set};
 
@@ -178,6 +184,7 @@ enum DepthEncoding {
     #[default]
     Plain,
     Packed24,
+    Carla,
 }
 
 /// Which row a PFM file begins with: the format says the bottom one, and not everybody keeps to it.
@@ -194,6 +201,7 @@ enum DepthKind {
     #[default]
     Planar,
     Range,
+    Inverse,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
@@ -246,6 +254,8 @@ pub struct FrameFile {
     pub fog: Option<LinearFog>,
     /// Share of the pixels whose depth is unknown or sky.
     pub without_depth: f64,
+    /// What of the pictures is not as it seems, or left out.
+    pub notes: Vec<String>,
 }
 
 /// Reads a frame file of one frame, its pictures and its poses.
@@ -283,15 +293,29 @@ fn read_spec(path: &Path) -> Result<FrameSpec, FrameFileError> {
     Ok(spec)
 }
 
+/// Where the first pixel of an EXR is in the file's own pixels; `None` of other pictures.
+type Origin = Option<[i32; 2]>;
+
 /// Reads the pictures of one frame.
-fn read_pictures(spec: &FrameSpec, color: &Path, depth: Option<&Path>, motion: Motion, path: &Path) -> Result<FrameFile, FrameFileError> {
+fn read_pictures(
+    spec: &FrameSpec,
+    color: &Path,
+    depth: Option<&Path>,
+    motion: Motion,
+    path: &Path,
+) -> Result<(FrameFile, Origin), FrameFileError> {
     let fail = |key, message: &str| FrameFileError::Key { path: path.into(), key, message: message.to_owned() };
     let color = images::read_color(color, spec, path)?;
     let size_px @ [width, height] = color.size_px;
     let principal_px = DVec2::from_array(spec.principal_point_px.unwrap_or(color.centre_px));
     let geometry = IdealGeometry { size_px, focal_px: DVec2::from_array(spec.focal_px), principal_px };
+    let mut notes = color.notes;
     let mut inverse_depth = match depth {
-        Some(depth) => depth::read_inverse_depth(depth, spec, &geometry, color.origin_px, path)?,
+        Some(depth) => {
+            let depth::Depth { inverse, notes: of_depth } = depth::read_depth(depth, spec, &geometry, color.origin_px, path)?;
+            notes.extend(of_depth.into_iter().filter(|note| !notes.contains(note)).collect::<Vec<_>>());
+            inverse
+        }
         None if motion.translates() => {
             return Err(fail(
                 "depth",
@@ -317,7 +341,7 @@ fn read_pictures(spec: &FrameSpec, color: &Path, depth: Option<&Path>, motion: M
         Holes::Mark => {}
     }
     let frame = IdealFrame { geometry, color_rgba: color.rgba, inverse_depth, holes, instant_s: 1e-3 * spec.instant_ms };
-    Ok(FrameFile { frame, motion, fog, without_depth })
+    Ok((FrameFile { frame, motion, fog, without_depth, notes }, color.origin_px))
 }
 
 #[cfg(test)]

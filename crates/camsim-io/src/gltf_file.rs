@@ -10,18 +10,21 @@ use std::{
     sync::Arc,
 };
 
-use camsim_core::scene::{Material, Mesh, Shape};
+use camsim_core::scene::{Material, Mesh, Shape, Texture, Wrap};
 use glam::{DAffine3, DMat3, DVec3};
 
 mod accessor;
 mod checks;
 mod emitted;
 mod material;
+mod mend;
 mod normals;
 mod pose;
 mod primitive;
 mod source;
+mod treatments;
 
+use emitted::Bake;
 use material::Materials;
 use pose::Pose;
 use source::Source;
@@ -91,6 +94,8 @@ struct Part {
 /// From a model's axes (x left, y up, z ahead) to forward, right, down.
 const BODY_FROM_MODEL: DMat3 = DMat3::from_cols(DVec3::new(0.0, -1.0, 0.0), DVec3::new(0.0, 0.0, -1.0), DVec3::new(1.0, 0.0, 0.0));
 
+/// Texels that are made where base colour and emitted light lie in different ways, at most: half a gigabyte.
+const MOST_BAKED: usize = 1 << 27;
 /// Parts of a scene, at most: a slip in a number must not fill the memory.
 const MOST_PARTS: usize = 1 << 20;
 /// No point of a model is farther from its origin, metres: what claims to be is a slip in a number.
@@ -144,13 +149,15 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
         source: &source,
         options,
         shapes: HashMap::new(),
+        baked: HashMap::new(),
+        texels_left: MOST_BAKED,
         parts: Vec::new(),
         met: HashSet::new(),
         notes: Vec::new(),
         reach_m: 0.0,
     };
     for node in scene.nodes() {
-        reader.node(&node, DAffine3::IDENTITY, 0)?;
+        reader.node(&node, DAffine3::IDENTITY, false, 0)?;
     }
     let Reader { parts, mut notes, materials, reach_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
     if parts.is_empty() {
@@ -162,12 +169,19 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     if options.time_s.is_none() && options.animation.is_some() {
         notes.push("animation says nothing without time_s: its nodes are as they stand; give the time of the file that is meant".into());
     }
+    if options.time_s.is_none() && options.animation.is_none() && document.animations().next().is_some() {
+        notes.push("has animations, and no time_s says which instant of them is meant: its nodes are as they stand".into());
+    }
+    notes.extend(source.notes.iter().cloned());
     notes.extend(pose_notes);
     notes.extend(materials.notes);
     notes.sort();
     notes.dedup();
     Ok(Model { parts, notes, reach_m })
 }
+
+/// A shape, and the picture of its base colour and its emitted light.
+type BakedPart = (Arc<Shape>, Arc<Texture>);
 
 struct Reader<'a> {
     source: &'a Source,
@@ -176,6 +190,10 @@ struct Reader<'a> {
     materials: Materials<'a>,
     /// By mesh, primitive and whether it is mirrored: those that no node changes.
     shapes: HashMap<(usize, usize, bool), Arc<Shape>>,
+    /// Of those the ones with a picture of emitted light that lies in its own way: the shape and its picture, or that there is none.
+    baked: HashMap<(usize, usize, bool), Option<BakedPart>>,
+    /// Texels that further ones may have.
+    texels_left: usize,
     parts: Vec<Part>,
     /// Nodes that have been met: a tree comes by each of them once.
     met: HashSet<usize>,
@@ -185,21 +203,23 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, depth: usize) -> Result<(), GltfError> {
+    fn node(&mut self, node: &gltf::Node<'_>, model_from_parent: DAffine3, is_hidden: bool, depth: usize) -> Result<(), GltfError> {
         if depth > DEEPEST {
             return Err(self.source.broken(format!("nodes.{}: is within itself, or {DEEPEST} nodes deep", node.index())));
         }
         if !self.met.insert(node.index()) {
             return Err(self.source.broken(format!("nodes.{}: has two parents", node.index())));
         }
+        // What is not seen must be no tree of its own either.
+        let is_hidden = is_hidden || !self.source.is_visible(node.index());
         let model_from_node = model_from_parent * self.pose.parent_from_node(node);
-        if let Some(mesh) = node.mesh() {
+        if let Some(mesh) = node.mesh().filter(|_| !is_hidden) {
             let instances = self.source.instances(node.index())?;
             for node_from_instance in instances.unwrap_or_else(|| vec![DAffine3::IDENTITY]) {
                 self.mesh(node, &mesh, model_from_node * node_from_instance)?;
             }
         }
-        node.children().try_for_each(|child| self.node(&child, model_from_node, depth + 1))
+        node.children().try_for_each(|child| self.node(&child, model_from_node, is_hidden, depth + 1))
     }
 
     fn mesh(&mut self, node: &gltf::Node<'_>, mesh: &gltf::Mesh<'_>, model_from_node: DAffine3) -> Result<(), GltfError> {
@@ -229,31 +249,45 @@ impl Reader<'_> {
                 let (number, set) = (mesh.index(), uv.set);
                 self.notes.push(format!("meshes.{number}: has no TEXCOORD_{set} for its picture to lie by: one texel of it is all over"));
             }
-            let shape = match self.shapes.get(&key).filter(|_| !own) {
-                Some(shape) => shape.clone(),
-                None => {
-                    let beyond = Cell::new(false);
-                    let made = primitive::Making {
-                        source: self.source,
-                        mesh,
-                        triangles,
-                        mirrored,
-                        uv: &uv,
-                        weights: &weights,
-                        joints: joints.as_deref(),
-                        normals: self.options.normals && uv.takes_light,
-                        beyond: &beyond,
-                    };
-                    let shape = made.shape(&primitive)?;
-                    if beyond.get() {
-                        let number = mesh.index();
-                        self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
+            let beyond = Cell::new(false);
+            let made = primitive::Making {
+                source: self.source,
+                mesh,
+                triangles,
+                mirrored,
+                uv: &uv,
+                weights: &weights,
+                joints: joints.as_deref(),
+                normals: self.options.normals && uv.takes_light,
+                beyond: &beyond,
+            };
+            let baked = match self.materials.bake_of(&primitive.material()) {
+                None => None,
+                Some(bake) => match self.baked.get(&key).filter(|_| !own) {
+                    Some(known) => known.clone(),
+                    None => {
+                        let found = self.bake(&made, &primitive, &bake)?;
+                        if !own {
+                            self.baked.insert(key, found.clone());
+                        }
+                        found
                     }
-                    Arc::new(shape)
+                },
+            };
+            let (shape, material) = match (baked, self.shapes.get(&key).filter(|_| !own)) {
+                (Some((shape, texture)), _) => (shape, Material { texture, wrap: [Wrap::Clamp; 2], nearest: false, ..material }),
+                (None, Some(shape)) => (shape.clone(), material),
+                (None, None) => {
+                    let shape = Arc::new(made.shape(&primitive)?);
+                    if !own {
+                        self.shapes.insert(key, shape.clone());
+                    }
+                    (shape, material)
                 }
             };
-            if !own {
-                self.shapes.insert(key, shape.clone());
+            if beyond.get() {
+                let number = mesh.index();
+                self.notes.push(format!("meshes.{number}: COLOR_0 is taken as the nearest within 0 to 1 where it is not"));
             }
             let corner_m =
                 shape.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m.map(f64::from)).length()).fold(0.0, f64::max);
@@ -272,6 +306,31 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+
+    /// A shape under one picture of its base colour and its emitted light, which lie in different ways on it.
+    fn bake(&mut self, made: &primitive::Making<'_>, primitive: &gltf::Primitive<'_>, of: &Bake) -> Result<Option<BakedPart>, GltfError> {
+        // What has emitted light on top is not lit: one picture cannot hold both.
+        let shape = primitive::Making { normals: false, ..*made }.shape(primitive)?;
+        let light_uvs = made.uvs(primitive, &of.light.rule, shape.vertices.len())?;
+        let name = self.source.material_name(primitive.material().index());
+        let Some(emitted::Baked { shape, texture, coarser }) = emitted::bake(&shape, &light_uvs, of, self.texels_left) else {
+            self.notes.push(format!(
+                "{name}: its picture of emitted light is left out: it lies otherwise than the base colour, and in neither layout each place of the surface has a place of \
+                 its own, or one picture of both would be too large; give it the base colour's texture coordinates"
+            ));
+            return Ok(None);
+        };
+        self.texels_left -= texture.rgba8.len() / 4;
+        if coarser > 1.25 {
+            self.notes.push(format!(
+                "{name}: base colour and emitted light lie in different ways, and are shown {coarser:.1} times coarser than they are"
+            ));
+        }
+        if self.options.normals {
+            self.notes.push("what has a picture of emitted light keeps its colours: light does not fall on it".into());
+        }
+        Ok(Some((Arc::new(shape), Arc::new(texture))))
     }
 }
 

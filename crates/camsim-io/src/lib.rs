@@ -31,3 +31,6 @@ pub mod inputs;
 pub mod manifest;
 
 pub mod compare;
+
+#[cfg(test)]
+mod inputs_page;

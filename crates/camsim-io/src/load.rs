@@ -21,9 +21,12 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod optics;
 mod placements;
 mod scene;
 
+pub use optics::vignette_warnings;
+use optics::{load_zoom_track, optics_warnings};
 pub use scene::board_place;
 use scene::load_scene;
 
@@ -108,7 +111,9 @@ pub enum LoadError {
     )]
     TooManyFrames(f64, f64),
     /// The zoom track.
-    #[error("{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` and rows of finite numbers by ascending time")]
+    #[error(
+        "{path}{line}: {problem}; camera.zoom_track needs a header `t_s,zoom` (or t_ms, t_us, t_ns) and rows of finite numbers by ascending time"
+    )]
     ZoomTrack {
         /// The file.
         path: PathBuf,
@@ -247,41 +252,6 @@ fn frames_outside(sequence: &Sequence) -> usize {
     (0..sequence.frames).filter(|&i| centre_s(i) < first_s - 1e-9 || centre_s(i) > last_s + 1e-9).count()
 }
 
-/// `t_s,zoom` on the log's clock, brought to path time.
-fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64)>, LoadError> {
-    let camera = &scenario.camera;
-    let Some(path) = &camera.zoom_track else {
-        return if camera.zoom.is_empty() { Ok(Vec::new()) } else { Err(LoadError::ZoomPair) };
-    };
-    if camera.zoom.is_empty() {
-        return Err(LoadError::ZoomPair);
-    }
-    let fail = |line: Option<u64>, problem: String| LoadError::ZoomTrack {
-        path: path.clone(),
-        line: line.map_or(String::new(), |line| format!(", line {line}")),
-        problem,
-    };
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(|error| fail(None, error.to_string()))?;
-    if reader.headers().map_err(|error| fail(None, error.to_string()))? != ["t_s", "zoom"].as_slice() {
-        return Err(fail(Some(1), "the header is not `t_s,zoom`".into()));
-    }
-    let epoch_s = log.epoch_ns as f64 * 1e-9;
-    let mut rows: Vec<(f64, f64)> = Vec::new();
-    for record in reader.deserialize::<(f64, f64)>() {
-        let (t_s, zoom) = record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
-        let at = ((t_s - epoch_s) / scenario.flight.speed, zoom);
-        if !at.0.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= at.0) {
-            return Err(fail(None, format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before")));
-        }
-        rows.push(at);
-    }
-    if rows.is_empty() { Err(fail(None, "there are no rows".into())) } else { Ok(rows) }
-}
-
 /// What log and tracker have to say: limits that held the platform back, repairs.
 #[must_use]
 pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) -> Vec<String> {
@@ -321,6 +291,7 @@ fn blind_share_warning(sequence: &Sequence) -> Option<String> {
 fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
     let mut warnings = flight_warnings(&sequence.scenario, log, tracked);
     warnings.extend(blind_share_warning(sequence));
+    warnings.extend(optics_warnings(sequence));
     let far_m = sequence.path.pose(sequence.start_s).position_ned_m.length();
     if far_m > FAR_FROM_ORIGIN_M {
         warnings.push(format!(

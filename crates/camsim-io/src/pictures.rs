@@ -69,9 +69,22 @@ pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureE
 /// [`PictureError`] names the file.
 pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
     if is_tiff(path)? {
-        return Raster::read(path)?.to_gray(path);
+        let raster = Raster::read(path)?;
+        let pixels = raster.size[0] as usize * raster.size[1] as usize;
+        // Floats of 0 to 255 would be white throughout.
+        let most = if raster.depth_is_whole() == Some(false) { (0..pixels).map(|at| raster.value(at)).fold(0.0, f64::max) } else { 0.0 };
+        if most > 1.0 + 1e-6 {
+            return Err(PictureError::decode(
+                path,
+                format!("grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"),
+            ));
+        }
+        return raster.to_gray(path);
     }
     let picture = decode(path)?;
+    if picture.color().has_alpha() && picture.to_rgba8().pixels().any(|pixel| pixel.0[3] < u8::MAX) {
+        return Err(PictureError::decode(path, "grey values are wanted, and parts of it are transparent: flatten it onto black or white"));
+    }
     let size_px = [picture.width(), picture.height()];
     let values = match picture {
         DynamicImage::ImageLuma8(gray) => gray.into_raw().into_iter().map(|v| f32::from(v) / 255.0).collect(),

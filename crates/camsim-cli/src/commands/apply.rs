@@ -9,6 +9,7 @@ use camsim_core::{
 };
 use camsim_io::{
     frame_file::{FrameFile, FrameSet, read_frame_set},
+    load::vignette_warnings,
     pictures::read_gray_image,
     scenario_file::read_checked_camera,
     write::write_picture,
@@ -31,16 +32,18 @@ mod folder;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 FRAME.toml (paths relative to it):
-  color = \"ideal.png\"          EXR (linear), PNG, JPEG, BMP; color_space = \"srgb\" | \"linear\"
+  color = \"ideal.png\"          EXR (linear), PNG, JPEG, BMP, TIFF, WebP; color_space = \"srgb\" | \"linear\"
   color_channels = [\"R\", \"G\", \"B\"], color_layer; depth_channel = \"Depth.Z\", depth_layer
                                of an EXR with several layers or parts: whole names, or their ends; a name that is not there
                                gets a list of those that are
-  depth = \"depth.exr\"          EXR Z, PFM or TIFF of floats in metres, or 16-bit PNG, PGM or TIFF with depth_per_metre (0.001
-                               to 1e6), or 8-bit RGB PNG with depth_encoding = \"packed24\"; positive forward, 0 is unknown or
-                               sky: infinitely far
+  depth = \"depth.exr\"          EXR Z, PFM, TIFF or .npy of floats in metres, or 16-bit PNG, PGM, TIFF or .npy of whole numbers
+                               with depth_per_metre (0.001 to 1e6), or 8-bit RGB PNG with depth_encoding = \"packed24\"
+                               ((65025 R + 255 G + B) / 255 m) | \"carla\" (1000 (R + 256 G + 65536 B) / 16777215 m); positive
+                               forward, 0 is unknown or sky: infinitely far
   depth_rows = \"bottom-up\"     of a PFM: the row that it begins with | \"top-down\", as AirSim writes them
   depth_max_m = 1e9            what is stored as that far, or farther, is no depth: the value that stands for the sky
-  depth_kind = \"planar\"        | \"range\"
+  depth_kind = \"planar\"        | \"range\", along the ray | \"inverse\": depth_per_metre / z, of disparities focal length in
+                               pixels times baseline in metres
   holes = \"far\"               | \"nearest\": where there is no depth, that of the nearest pixel that has one | \"mark\": what looks
                                there is alpha 0
   focal_px = [307.6, 307.6]    of the ideal picture, which may be larger than the output
@@ -50,9 +53,9 @@ FRAME.toml (paths relative to it):
                                with the camera ...
   velocity_m_s = [0.0, 0.0, 0.0]
   angular_rate_rad_s = [0.0, 0.0, 0.628]
-  trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera), and stamp_s;
-                               trajectory_format = \"tum\": t x y z qx qy qz qw without a header
-  flow = \"flow.flo\"            ... or where each pixel goes in flow_interval_ms, camera and things together: Middlebury .flo, or an EXR
+  trajectory = \"poses.csv\"     ... or any motion, as poses t_s,x,y,z,qw,qx,qy,qz (world_from_camera; units by name: t_ms, x_mm),
+                               and stamp_s; trajectory_format = \"tum\": t x y z qx qy qz qw without a header
+  flow = \"flow.flo\"            ... or where each pixel goes in flow_interval_ms, camera and things together: Middlebury .flo, .npy, or an EXR
                                of two channels (of more: flow_channels = [\"X\", \"Y\"], right and down); flow_scale = [1, -1]
                                where y is up
   [fog]                        end_m, color: with --preset paper only
@@ -61,7 +64,7 @@ Many frames, in place of color, depth and stamp_s:
   color = \"rgb/*.png\", depth = \"depth/*.png\"   paired by what stands for the *; name_unit = \"s\" | \"ms\" | \"us\" | \"ns\" says that it is
                                a time: then paired with the nearest within max_gap_ms = 20
   color = \"rgb.txt\", depth = \"depth.txt\"       lists of `time file`
-  frames = \"associations.txt\"                   a table of `time color time depth`, or a .csv of t_s (or stamp_ns), color, depth
+  frames = \"associations.txt\"                   a table of `time color time depth`, or a .csv of t_s (t_ms, t_us, t_ns), color, depth
   fps = 30                     times for frames that have none, from motion.stamp_s on
 
 Examples:
@@ -135,12 +138,15 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         }
     }
     let set = read_frame_set(&args.frame).or_bad_input()?;
+    set.notes().iter().for_each(|note| console.warn(note));
     let vignette = spec.photometric.vignette.as_deref().map(read_gray_image).transpose().or_bad_input()?;
+    vignette.iter().flat_map(|map| vignette_warnings(&spec, map)).for_each(|warning| console.warn(warning));
     if set.is_several() {
         return folder::run(args, &spec, &set, vignette.as_ref(), console);
     }
     refuse_options_of_many(args, is_picture)?;
     let file = read(args, &set, 0, console)?;
+    file.notes.iter().for_each(|note| console.warn(note));
     let begin = Instant::now();
     let settings = settings(args, &file, 0);
     let pipeline = Pipeline::new(&spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;

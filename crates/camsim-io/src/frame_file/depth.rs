@@ -4,17 +4,17 @@ use std::path::Path;
 
 use camsim_core::temporal::IdealGeometry;
 use glam::DVec2;
-use image::{DynamicImage, ImageFormat};
+use image::DynamicImage;
 
 use super::{
     DepthEncoding, DepthKind, FrameFileError, FrameSpec,
     exr_planes::read_exr,
-    floats::{self, Stored},
+    floats::{self, Stored, Unit},
     images::{failure, is_exr, open},
+    npy,
+    packed::{self, Packing},
 };
 
-/// Depth of the reference program's cleared buffer, metres: all three bytes full.
-const PACKED24_SKY_M: f64 = 65_281.0;
 /// Stored values of one metre that 16 bits make sense of: steps from a kilometre to a micrometre.
 const PER_METRE: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 /// No camera sees anything nearer, metres. Its inverse and the slant of any ray fit an f32.
@@ -23,16 +23,28 @@ const NEAREST_M: f64 = 1e-6;
 /// What is at least as far is no depth, metres, unless `depth_max_m` says less: no scene is as large, and Blender's background is 1e10.
 const FARTHEST_M: f64 = 1e9;
 
-/// 1/z in 1/m, 0 where there is no depth.
-pub(super) fn read_inverse_depth(
+/// Numbers of a camera that looks farther than this are no metres where all of them are whole.
+const WHOLE_ABOVE: f64 = 100.0;
+
+/// A depth picture.
+pub(super) struct Depth {
+    /// 1/z in 1/m, 0 where there is no depth.
+    pub(super) inverse: Vec<f32>,
+    /// What there is to say about it.
+    pub(super) notes: Vec<String>,
+}
+
+/// Reads a depth picture.
+pub(super) fn read_depth(
     path: &Path,
     spec: &FrameSpec,
     geometry: &IdealGeometry,
     color_origin_px: Option<[i32; 2]>,
     frame_path: &Path,
-) -> Result<Vec<f32>, FrameFileError> {
-    let Stored { size_px, values, whole } = stored(path, spec, color_origin_px, frame_path)?;
-    let per_metre = per_metre(spec.depth_per_metre, whole, frame_path)?;
+) -> Result<Depth, FrameFileError> {
+    let stored = stored(path, spec, color_origin_px, frame_path)?;
+    let per_metre = per_metre(spec, &stored, frame_path)?;
+    let Stored { size_px, values, notes, .. } = stored;
     if size_px != geometry.size_px {
         let [w, h] = geometry.size_px;
         return Err(failure(
@@ -40,42 +52,58 @@ pub(super) fn read_inverse_depth(
             format!("is {}x{}, but the colour is {w}x{h}: depth must have the colour's size and place", size_px[0], size_px[1]),
         ));
     }
-    refuse_without_any(&values, per_metre, path)?;
+    let in_metres = |value: f64| if spec.depth_kind == DepthKind::Inverse { per_metre / value } else { value / per_metre };
+    refuse_without_any(&values, in_metres, path)?;
     let most_m = spec.depth_max_m.unwrap_or(FARTHEST_M).min(FARTHEST_M);
     let planar = |(i, value): (usize, f64)| {
-        let depth_m = value / per_metre;
+        let depth_m = in_metres(value);
         let pixel = DVec2::new((i as u32 % size_px[0]).into(), (i as u32 / size_px[0]).into());
         let slant = match spec.depth_kind {
-            DepthKind::Planar => 1.0,
+            DepthKind::Planar | DepthKind::Inverse => 1.0,
             DepthKind::Range => ((pixel - geometry.principal_px) / geometry.focal_px).extend(1.0).length(),
         };
         let inverse = slant / depth_m;
         if usable(depth_m) && depth_m < most_m { inverse as f32 } else { 0.0 }
     };
-    Ok(values.into_iter().enumerate().map(planar).collect())
+    Ok(Depth { inverse: values.into_iter().enumerate().map(planar).collect(), notes })
 }
 
 /// The numbers of a depth picture, in whatever kind of file.
 fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, frame_path: &Path) -> Result<Stored, FrameFileError> {
     let fail = |key, message: &str| FrameFileError::Key { path: frame_path.into(), key, message: message.to_owned() };
-    let packed = spec.depth_encoding == DepthEncoding::Packed24;
+    let packing = match spec.depth_encoding {
+        DepthEncoding::Plain => None,
+        DepthEncoding::Packed24 => Some(Packing::Packed24),
+        DepthEncoding::Carla => Some(Packing::Carla),
+    };
     let exr = is_exr(path);
     if let (false, Some(key)) = (exr, spec.depth_key()) {
         return Err(fail(key, "is for EXR, and depth is none; leave it out"));
     }
     let floats = if exr { Some(read_exr_depth(path, spec, color_origin_px)?) } else { floats::read(path, spec.depth_rows, frame_path)? };
-    if let Some(found) = floats {
-        let message = "\"packed24\" is of 8-bit RGB pictures, and depth is an EXR, PFM or TIFF; leave it out";
-        return if packed { Err(fail("depth_encoding", message)) } else { Ok(found) };
+    let found = match floats {
+        None if !exr => read_npy(path)?,
+        floats => floats,
+    };
+    if let Some(found) = found {
+        let Some(packing) = packing else { return Ok(found) };
+        let message = format!("\"{}\" is of 8-bit RGB pictures, and depth is an EXR, PFM, TIFF or .npy; leave it out", packing.word());
+        return Err(fail("depth_encoding", &message));
     }
     let (picture, format) = open(path)?;
-    if packed && !matches!(format, ImageFormat::Png | ImageFormat::Bmp | ImageFormat::Pnm) {
-        let message = "is not lossless: depth packed into bytes must be stored byte by byte; give it as PNG, BMP or PPM";
-        return Err(failure(path, message));
-    }
     let size_px = [picture.width(), picture.height()];
-    let values = if packed { packed24(&picture, path)? } else { whole_numbers(&picture, path)? };
-    Ok(Stored { size_px, values, whole: !packed })
+    let (values, unit) = match packing {
+        Some(packing) => (packed::metres(&picture, format, packing, path)?, Unit::Packed),
+        None => (whole_numbers(&picture, path)?, Unit::Whole),
+    };
+    Ok(Stored { size_px, values, unit, notes: Vec::new() })
+}
+
+fn read_npy(path: &Path) -> Result<Option<Stored>, FrameFileError> {
+    let Some(array) = npy::read(path)? else { return Ok(None) };
+    let size_px = array.plane().map_err(|message| failure(path, message))?;
+    let unit = if array.whole { Unit::Whole } else { Unit::Floats };
+    Ok(Some(Stored { size_px, values: array.values, unit, notes: Vec::new() }))
 }
 
 fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>) -> Result<Stored, FrameFileError> {
@@ -88,19 +116,54 @@ fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2
         );
         return Err(failure(path, message));
     }
-    Ok(Stored { size_px: plane.size_px, values: plane.values.iter().map(|&z| f64::from(z)).collect(), whole: false })
+    // What is far from near becomes near from far: a file that names its channel so must not be read as metres.
+    let lower = plane.name.to_lowercase();
+    if let Some(word) = ["disp", "inv"].into_iter().find(|word| lower.contains(word)).filter(|_| spec.depth_kind != DepthKind::Inverse) {
+        let fix = "set depth_kind = \"inverse\" if it is of 1/z, or name the channel of metres with depth_channel";
+        return Err(failure(path, format!("{}: is a disparity or an inverse depth by its name (`{word}`): {fix}", plane.name)));
+    }
+    Ok(Stored {
+        size_px: plane.size_px,
+        values: plane.values.iter().map(|&z| f64::from(z)).collect(),
+        unit: Unit::Floats,
+        notes: picture.notes(spec.focal_px),
+    })
 }
 
-/// Stored value of one metre.
-fn per_metre(given: Option<f64>, whole: bool, frame_path: &Path) -> Result<f64, FrameFileError> {
-    let message = match (given, whole) {
-        (Some(per_metre), true) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
-        (None, false) => return Ok(1.0),
-        (Some(_), true) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
-        (Some(_), false) => "is for whole numbers (PNG, PGM, TIFF); EXR, PFM, TIFF of floats and packed24 are in metres: leave it out",
-        (None, true) => "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM",
+/// Stored value of one metre; of inverse depth, of one inverse metre.
+fn per_metre(spec: &FrameSpec, stored: &Stored, frame_path: &Path) -> Result<f64, FrameFileError> {
+    let (given, inverse) = (spec.depth_per_metre, spec.depth_kind == DepthKind::Inverse);
+    let message = match (given, stored.unit) {
+        (Some(_), Unit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in metres: leave it out".to_owned(),
+        (Some(per_metre), _) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
+        (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned(),
+        (None, Unit::Whole | Unit::Floats) if inverse => {
+            "is missing: with depth_kind = \"inverse\" give the stored value of 1/m; of disparities in pixels that is focal length in pixels times \
+             baseline in metres"
+                .to_owned()
+        }
+        (None, Unit::Whole) => {
+            "is missing: whole numbers need the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned()
+        }
+        (None, Unit::Floats) => match whole_numbers_between(&stored.values) {
+            Some([least, most]) => format!(
+                "is missing: depth is of floats, which are metres, but all of them are whole numbers from {least} to {most}, as millimetres are: give \
+                 1000 for millimetres, 1 for metres"
+            ),
+            None => return Ok(1.0),
+        },
+        (None, Unit::Packed) => return Ok(1.0),
     };
-    Err(FrameFileError::Key { path: frame_path.into(), key: "depth_per_metre", message: message.to_owned() })
+    Err(FrameFileError::Key { path: frame_path.into(), key: "depth_per_metre", message })
+}
+
+/// The least and the largest depth where all are whole and more than any camera that stores metres would round so: it may be millimetres.
+fn whole_numbers_between(values: &[f64]) -> Option<[f64; 2]> {
+    let known = || values.iter().copied().filter(|&z| usable(z) && z < FARTHEST_M);
+    let whole = known().all(|z| z.fract() == 0.0 && z > WHOLE_ABOVE);
+    let [least, most] = known().fold([f64::INFINITY, 0.0], |[least, most], z| [z.min(least), z.max(most)]);
+    // One distance throughout is a plane, and no unit.
+    (whole && most > least).then_some([least, most])
 }
 
 /// Nothing is nearer than [`NEAREST_M`]; what claims to be is no measurement either.
@@ -134,8 +197,8 @@ pub(super) fn fill_holes(inverse_depth: &mut [f32], [width, height]: [u32; 2]) {
 }
 
 /// Zeros and infinities alone may be sky. Without any depth, whatever else is there shows that the picture is in another sign or unit.
-fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(), FrameFileError> {
-    if values.iter().any(|value| usable(value / per_metre)) {
+fn refuse_without_any(values: &[f64], in_metres: impl Fn(f64) -> f64, path: &Path) -> Result<(), FrameFileError> {
+    if values.iter().any(|value| usable(in_metres(*value))) {
         return Ok(());
     }
     let count = |what: &dyn Fn(f64) -> bool| values.iter().filter(|value| what(**value)).count();
@@ -154,24 +217,24 @@ fn refuse_without_any(values: &[f64], per_metre: f64, path: &Path) -> Result<(),
 }
 
 fn whole_numbers(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
+    let kinds = "16-bit PNG, PGM or TIFF, or EXR, PFM, TIFF or .npy of floats";
     match picture {
         DynamicImage::ImageLuma16(gray) => Ok(gray.as_raw().iter().map(|&v| f64::from(v)).collect()),
-        _ => Err(failure(
-            path,
-            "is no 16-bit grey picture: give depth as 16-bit PNG, PGM or TIFF, as EXR, PFM or TIFF of floats, or set depth_encoding = \"packed24\"",
-        )),
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
+            let message = format!(
+                "is an 8-bit RGB picture, whose bytes do not tell how depth was packed into them: set {}; or give it as {kinds}",
+                packed::FORMULAS
+            );
+            Err(failure(path, message))
+        }
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+            let message = format!(
+                "is no 16-bit grey picture but an 8-bit one, as drawings of depth are, whose 256 steps are no distances: give depth as {kinds}"
+            );
+            Err(failure(path, message))
+        }
+        _ => Err(failure(path, format!("is no 16-bit grey picture of one channel: give depth as {kinds}"))),
     }
-}
-
-/// Decoded texel by texel: packed bytes must never be filtered.
-fn packed24(picture: &DynamicImage, path: &Path) -> Result<Vec<f64>, FrameFileError> {
-    if !matches!(picture, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_)) {
-        let message = "is no 8-bit RGB picture, which depth_encoding = \"packed24\" is for; leave that key out for 16-bit grey";
-        return Err(failure(path, message));
-    }
-    let depth_m = |[r, g, b]: [u8; 3]| f64::from(r) * 255.0 + f64::from(g) + f64::from(b) / 255.0;
-    let metres = picture.to_rgb8().pixels().map(|pixel| depth_m(pixel.0)).collect::<Vec<_>>();
-    Ok(metres.into_iter().map(|z| if z >= PACKED24_SKY_M { 0.0 } else { z }).collect())
 }
 
 #[cfg(test)]

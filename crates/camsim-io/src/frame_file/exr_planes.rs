@@ -3,7 +3,7 @@
 //! A plane's whole name is `layer.channel`, as Blender's multilayer files have it (`ViewLayer.Depth.Z`); in a file of several parts the
 //! part's name comes before, unless the channel has it already. A name is found whole, or by its end where only one ends so.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use exr::prelude::read_all_flat_layers_from_file;
 
@@ -33,6 +33,11 @@ pub(super) struct Planes {
     pub(super) planes: Vec<Plane>,
     /// Middle of the display window, in the file's own pixels: where the optical axis is, whatever part of the picture the file holds.
     pub(super) display_centre_px: [f64; 2],
+    /// Width of a pixel over its height.
+    pixel_aspect: f64,
+    /// Whether red, green, blue and white are others than those of sRGB.
+    other_primaries: bool,
+    path: PathBuf,
 }
 
 /// Reads every part.
@@ -63,10 +68,40 @@ pub(super) fn read_exr(path: &Path) -> Result<Planes, FrameFileError> {
             });
         }
     }
-    Ok(Planes { planes, display_centre_px })
+    let pixel_aspect = f64::from(image.attributes.pixel_aspect);
+    let other_primaries = image.attributes.chromaticities.is_some_and(|found| {
+        let of = [found.red, found.green, found.blue, found.white];
+        of.iter().zip(REC709).any(|(at, [x, y])| (at.x() - x).abs() > 2e-3 || (at.y() - y).abs() > 2e-3)
+    });
+    Ok(Planes { planes, display_centre_px, pixel_aspect, other_primaries, path: path.into() })
 }
 
+/// Red, green, blue and white of sRGB.
+const REC709: [[f32; 2]; 4] = [[0.64, 0.33], [0.3, 0.6], [0.15, 0.06], [0.3127, 0.329]];
+
 impl Planes {
+    /// What the header says that the keys do not go with, or that is left out.
+    pub(super) fn notes(&self, [fx, fy]: [f64; 2]) -> Vec<String> {
+        let mut notes = Vec::new();
+        // Pixels that are wide have a focal length that is short in them.
+        let implied = fy / fx;
+        // 1 is what writers leave there without a thought.
+        if self.pixel_aspect != 1.0 && (implied / self.pixel_aspect - 1.0).abs() > 0.01 {
+            let (path, aspect) = (self.path.display(), self.pixel_aspect);
+            notes.push(format!(
+                "{path}: its header says that a pixel is {aspect} times as wide as high (pixelAspectRatio), focal_px = [{fx}, {fy}] that it is {implied:.4} times: \
+                 focal_px counts"
+            ));
+        }
+        if self.other_primaries {
+            let path = self.path.display();
+            notes.push(format!(
+                "{path}: its chromaticities are not those of sRGB: colours are left as they are stored; convert the picture if they matter"
+            ));
+        }
+        notes
+    }
+
     /// The only two planes of a file.
     pub(super) fn pair(&self) -> Result<[&Plane; 2], String> {
         match &self.planes[..] {

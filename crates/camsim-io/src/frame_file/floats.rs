@@ -9,8 +9,20 @@ use crate::terrain::raster::{Raster, is_tiff};
 pub(super) struct Stored {
     pub(super) size_px: [u32; 2],
     pub(super) values: Vec<f64>,
-    /// Whole numbers, whose unit must be said; otherwise metres.
-    pub(super) whole: bool,
+    pub(super) unit: Unit,
+    /// What there is to say about the file.
+    pub(super) notes: Vec<String>,
+}
+
+/// What the numbers are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Unit {
+    /// Whole numbers, whose unit must be said.
+    Whole,
+    /// Metres, unless something else is said.
+    Floats,
+    /// Metres out of bytes, by a formula.
+    Packed,
 }
 
 /// The numbers of a PFM or a TIFF file, told by content; `None` if it is neither.
@@ -35,8 +47,12 @@ fn read_tiff(path: &Path) -> Result<Stored, FrameFileError> {
     let Some(whole) = raster.depth_is_whole() else {
         return Err(failure(path, "is a TIFF that is not of one channel of floats or 16-bit whole numbers: save depth as one of these"));
     };
+    let unit = if whole { Unit::Whole } else { Unit::Floats };
     let pixels = raster.size[0] as usize * raster.size[1] as usize;
-    Ok(Stored { size_px: raster.size, values: (0..pixels).map(|pixel| raster.value(pixel)).collect(), whole })
+    // GDAL's mark for what is not known.
+    let known = |value: f64| if raster.geo.nodata == Some(value) { f64::NAN } else { value };
+    let values = (0..pixels).map(|pixel| known(raster.value(pixel))).collect();
+    Ok(Stored { size_px: raster.size, values, unit, notes: Vec::new() })
 }
 
 fn begins_as_pfm(path: &Path) -> bool {
@@ -46,7 +62,7 @@ fn begins_as_pfm(path: &Path) -> bool {
     read.is_ok() && matches!(start, [b'P', b'f' | b'F', next] if next.is_ascii_whitespace())
 }
 
-/// `Pf`, width, height, a number whose sign tells the byte order, one white space, and the rows.
+/// `Pf`, width, height, a number whose sign tells the byte order and whose magnitude is a factor, one white space, and the rows.
 fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
     let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}")))?;
     let wrong = |message: String| failure(path, message);
@@ -72,8 +88,12 @@ fn read_pfm(path: &Path, rows: DepthRows) -> Result<Stored, FrameFileError> {
     if rows == DepthRows::BottomUp {
         lines.reverse();
     }
-    let values = lines.into_iter().flat_map(|line| line.chunks_exact(4).map(number)).collect();
-    Ok(Stored { size_px: [width, height], values, whole: false })
+    let factor = order.abs();
+    let values = lines.into_iter().flat_map(|line| line.chunks_exact(4).map(|bytes| factor * number(bytes))).collect();
+    let scaled =
+        || format!("{}: the scale {} of its header is applied: depth is {factor} times the numbers stored", path.display(), words[3]);
+    let notes = if factor == 1.0 { Vec::new() } else { vec![scaled()] };
+    Ok(Stored { size_px: [width, height], values, unit: Unit::Floats, notes })
 }
 
 /// Four words, and what follows the one white space after them.

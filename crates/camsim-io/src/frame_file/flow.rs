@@ -1,4 +1,4 @@
-//! Optical flow: Middlebury `.flo`, or two channels of an EXR.
+//! Optical flow: Middlebury `.flo`, two channels of an EXR, or a `.npy` of two numbers a pixel.
 
 use std::path::Path;
 
@@ -8,16 +8,27 @@ use super::{
     FrameFileError, MotionSpec,
     exr_planes::read_exr,
     images::{failure, is_exr},
+    npy,
 };
+
+/// Flow of each pixel, row by row, and of an EXR where its first pixel is in the file's own pixels.
+type Values = ([u32; 2], Vec<[f32; 2]>, Option<[i32; 2]>);
 
 /// The first four bytes of a `.flo` file are this number, little-endian.
 const FLO_TAG: f32 = 202_021.25;
 /// Middlebury's: what is larger is not known.
 const UNKNOWN_PX: f32 = 1e9;
 
-/// Reads `motion.flow`; its keys have been checked.
-pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<FlowField, FrameFileError> {
-    let (size_px, values) = if is_exr(path) { read_exr_flow(path, motion)? } else { read_flo(path)? };
+/// Reads `motion.flow`, whose keys have been checked; with the place of an EXR's first pixel.
+pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<(FlowField, Option<[i32; 2]>), FrameFileError> {
+    let (size_px, values, origin_px) = if is_exr(path) {
+        read_exr_flow(path, motion)?
+    } else if let Some(array) = npy::read(path)? {
+        let (size_px, values) = array.pairs().map_err(|message| failure(path, message))?;
+        (size_px, values, None)
+    } else {
+        read_flo(path)?
+    };
     let scale = motion.flow_scale.unwrap_or([1.0; 2]);
     let known = |[u, v]: [f32; 2]| u.abs() <= UNKNOWN_PX && v.abs() <= UNKNOWN_PX;
     let scaled = |uv: [f32; 2]| [0, 1].map(|k: usize| (f64::from(uv[k]) * scale[k]) as f32);
@@ -32,10 +43,10 @@ pub(super) fn read_flow(path: &Path, motion: &MotionSpec) -> Result<FlowField, F
     if px.iter().all(|uv| uv[0].is_nan()) {
         return Err(failure(path, "has no pixel whose flow is known: values are pixels, and more than 1e9 is none"));
     }
-    Ok(FlowField { size_px, px, interval_s: 1e-3 * motion.flow_interval_ms.unwrap_or_default() })
+    Ok((FlowField { size_px, px, interval_s: 1e-3 * motion.flow_interval_ms.unwrap_or_default() }, origin_px))
 }
 
-fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
+fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<Values, FrameFileError> {
     let picture = read_exr(path)?;
     let wrong = |message: String| failure(path, message);
     let [u, v] = match motion.flow_channels.as_deref() {
@@ -51,14 +62,17 @@ fn read_exr_flow(path: &Path, motion: &MotionSpec) -> Result<([u32; 2], Vec<[f32
     if u.size_px != v.size_px || u.origin_px != v.origin_px {
         return Err(failure(path, format!("has flow channels of different sizes or places: {} {}", u.name, v.name)));
     }
-    Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect()))
+    Ok((u.size_px, u.values.iter().zip(&v.values).map(|(u, v)| [*u, *v]).collect(), Some(u.origin_px)))
 }
 
-fn read_flo(path: &Path) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
+fn read_flo(path: &Path) -> Result<Values, FrameFileError> {
     let bytes = std::fs::read(path).map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
     let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
     if words.next().map(f32::from_le_bytes) != Some(FLO_TAG) {
-        return Err(failure(path, "is no Middlebury .flo file (they begin with PIEH), and no EXR by its name: a flow is one of the two"));
+        return Err(failure(
+            path,
+            "is no Middlebury .flo file (they begin with PIEH), no .npy, and no EXR by its name: a flow is one of these",
+        ));
     }
     let side = |word: Option<[u8; 4]>| word.map_or(0, u32::from_le_bytes);
     let size_px = [side(words.next()), side(words.next())];
@@ -68,5 +82,5 @@ fn read_flo(path: &Path) -> Result<([u32; 2], Vec<[f32; 2]>), FrameFileError> {
         let [width, height] = size_px;
         return Err(failure(path, format!("says {width}x{height} pixels and holds {} numbers: it is cut off or damaged", values.len())));
     }
-    Ok((size_px, values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect()))
+    Ok((size_px, values.chunks_exact(2).map(|pair| [pair[0], pair[1]]).collect(), None))
 }

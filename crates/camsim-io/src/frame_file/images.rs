@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use camsim_core::scene::linear_from_srgb;
-use image::{ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
 
 use super::{
     ColorSpace, FrameFileError, FrameSpec,
@@ -18,6 +18,8 @@ pub(super) struct Color {
     /// Where the optical axis is if nothing else is said: the middle of the whole picture, of which an EXR may hold a part, or more.
     pub(super) centre_px: [f64; 2],
     pub(super) rgba: Vec<f32>,
+    /// What there is to say about the file.
+    pub(super) notes: Vec<String>,
 }
 
 /// R G B as stored.
@@ -26,6 +28,7 @@ struct Decoded {
     origin_px: Option<[i32; 2]>,
     centre_px: [f64; 2],
     rgb: Vec<f32>,
+    notes: Vec<String>,
 }
 
 pub(super) fn failure(path: &Path, message: impl Into<String>) -> FrameFileError {
@@ -43,33 +46,114 @@ pub(super) fn read_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Re
         let message = "is for EXR, and color is none; leave it out".to_owned();
         return Err(FrameFileError::Key { path: frame_path.into(), key, message });
     }
-    let decoded = if exr { read_exr_color(path, spec)? } else { read_encoded_color(path)? };
+    let decoded = if exr { read_exr_color(path, spec)? } else { read_encoded_color(path, spec, frame_path)? };
     let default = if exr { ColorSpace::Linear } else { ColorSpace::Srgb };
     let linear = |v: f32| if spec.color_space.unwrap_or(default) == ColorSpace::Srgb { linear_from_srgb(v) } else { v };
     let rgba: Vec<f32> = decoded.rgb.chunks_exact(3).flat_map(|p| [linear(p[0]), linear(p[1]), linear(p[2]), 1.0]).collect();
     if rgba.iter().any(|v| !v.is_finite()) {
         return Err(failure(path, "holds a NaN or an infinity, which blur would spread; clean the picture before"));
     }
-    Ok(Color { size_px: decoded.size_px, origin_px: decoded.origin_px, centre_px: decoded.centre_px, rgba })
+    let Decoded { size_px, origin_px, centre_px, notes, .. } = decoded;
+    Ok(Color { size_px, origin_px, centre_px, rgba, notes })
 }
 
-fn read_encoded_color(path: &Path) -> Result<Decoded, FrameFileError> {
-    let picture = open(path)?.0;
+fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Result<Decoded, FrameFileError> {
+    let Opened { picture, format, icc } = decode(path)?;
+    let unsaid = |message: String| FrameFileError::Key { path: frame_path.into(), key: "color_space", message };
+    let needed = "set \"linear\" or \"srgb\"";
+    if spec.color_space.is_none() && matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
+        return Err(unsaid(format!("is missing: {} holds floats, which may be linear light or sRGB values: {needed}", path.display())));
+    }
+    let gamma = if format == ImageFormat::Png { png_gamma(path) } else { None };
+    if let (None, Some(gamma)) = (spec.color_space, gamma.filter(|gamma| (gamma - SRGB_GAMMA).abs() > 0.01)) {
+        return Err(unsaid(format!(
+            "is missing: {} says that its values are light to the power of {gamma} (gAMA), as sRGB is not: {needed}",
+            path.display()
+        )));
+    }
+    let mut notes = Vec::new();
+    if let Some(icc) = icc.filter(|icc| !icc.windows(4).any(|part| part == b"sRGB")) {
+        let bytes = icc.len();
+        notes.push(format!(
+            "{}: its colour profile ({bytes} bytes of ICC) is not applied: values are taken as color_space says",
+            path.display()
+        ));
+    }
+    if let Some(share) = clear_share(&picture) {
+        notes.push(format!("{}: its alpha is not read: {:.1} % of the pixels are not opaque", path.display(), 100.0 * share));
+    }
     let size_px = [picture.width(), picture.height()];
     let centre_px = size_px.map(|side| 0.5 * (f64::from(side) - 1.0));
-    Ok(Decoded { size_px, origin_px: None, centre_px, rgb: picture.to_rgb32f().into_raw() })
+    Ok(Decoded { size_px, origin_px: None, centre_px, rgb: picture.to_rgb32f().into_raw(), notes })
+}
+
+/// What sRGB's curve comes nearest to, as PNG files say it.
+const SRGB_GAMMA: f64 = 0.454_55;
+
+/// The exponent that a PNG's header states, unless it says that it is sRGB.
+fn png_gamma(path: &Path) -> Option<f64> {
+    let bytes = std::fs::read(path).ok()?;
+    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
+    let (mut at, mut found) = (8, None);
+    loop {
+        let length = word(at)? as usize;
+        match bytes.get(at + 4..at + 8)? {
+            b"sRGB" => return None,
+            b"gAMA" => found = word(at + 8).map(|value| f64::from(value) / 1e5),
+            b"IDAT" | b"IEND" => return found,
+            _ => {}
+        }
+        at = at.checked_add(length.checked_add(12)?)?;
+    }
+}
+
+/// The share of pixels with alpha below 1, if there are any.
+fn clear_share(picture: &DynamicImage) -> Option<f64> {
+    if !picture.color().has_alpha() {
+        return None;
+    }
+    let pixels = f64::from(picture.width()) * f64::from(picture.height());
+    let clear = picture.to_rgba16().pixels().filter(|pixel| pixel.0[3] < u16::MAX).count();
+    (clear > 0).then_some(clear as f64 / pixels)
 }
 
 /// A picture that is no EXR; its format is told by content.
-pub(super) fn open(path: &Path) -> Result<(image::DynamicImage, ImageFormat), FrameFileError> {
+pub(super) fn open(path: &Path) -> Result<(DynamicImage, ImageFormat), FrameFileError> {
+    decode(path).map(|Opened { picture, format, .. }| (picture, format))
+}
+
+struct Opened {
+    picture: DynamicImage,
+    format: ImageFormat,
+    /// Its colour profile.
+    icc: Option<Vec<u8>>,
+}
+
+fn decode(path: &Path) -> Result<Opened, FrameFileError> {
     let reader = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
         .map_err(|error| failure(path, format!("cannot be read: {error}; paths are relative to FRAME.toml")))?;
     let Some(format) = reader.format() else {
-        return Err(failure(path, "is no EXR, PNG, JPEG, BMP or PGM file (depth may be TIFF or PFM too)"));
+        return Err(failure(path, "is no EXR, PNG, JPEG, BMP, PGM, TIFF or WebP file (depth may be PFM or .npy too)"));
     };
-    let picture = reader.decode().map_err(|error| failure(path, format!("cannot be decoded: {error}")))?;
-    if picture.width() == 0 || picture.height() == 0 { Err(failure(path, "has no pixel")) } else { Ok((picture, format)) }
+    let undecoded = |error: image::ImageError| failure(path, format!("cannot be decoded: {error}"));
+    let mut decoder = reader.into_decoder().map_err(undecoded)?;
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    if orientation != Orientation::NoTransforms {
+        return Err(failure(
+            path,
+            format!(
+                "is stored turned (EXIF orientation {}), and depth, focal_px and principal_point_px may be of either: save it upright, or take the mark away \
+                 where they go with the pixels as they are stored (`exiftool -Orientation=1 -n FILE`)",
+                orientation.to_exif()
+            ),
+        ));
+    }
+    let icc = decoder.icc_profile().ok().flatten();
+    // A few bytes must not ask for all memory.
+    image::Limits::default().reserve(decoder.total_bytes()).map_err(undecoded)?;
+    let picture = DynamicImage::from_decoder(decoder).map_err(undecoded)?;
+    if picture.width() == 0 || picture.height() == 0 { Err(failure(path, "has no pixel")) } else { Ok(Opened { picture, format, icc }) }
 }
 
 fn read_exr_color(path: &Path, spec: &FrameSpec) -> Result<Decoded, FrameFileError> {
@@ -78,5 +162,5 @@ fn read_exr_color(path: &Path, spec: &FrameSpec) -> Result<Decoded, FrameFileErr
     let rgb = (0..colors[0].values.len()).flat_map(|i| colors.map(|plane| plane.values[i])).collect();
     let Plane { size_px, origin_px, .. } = *colors[0];
     let centre_px = [0, 1].map(|k| picture.display_centre_px[k] - f64::from(origin_px[k]));
-    Ok(Decoded { size_px, origin_px: Some(origin_px), centre_px, rgb })
+    Ok(Decoded { size_px, origin_px: Some(origin_px), centre_px, rgb, notes: picture.notes(spec.focal_px) })
 }

@@ -12,7 +12,7 @@
 //! ```
 //! ```toml
 //! frames = "associations.txt"        # `time color` or `time color time depth` a line
-//! frames = "frames.csv"              # columns color (or color_exr, color_png), depth, t_s or stamp_ns: camsim's own too
+//! frames = "frames.csv"              # columns color (or color_exr, color_png), depth, t_s (t_ms, t_us, t_ns) or stamp_ns: camsim's own too
 //! ```
 //! `fps`, with `motion.stamp_s` for the first, gives times to frames that have none. Times count where there is a trajectory; a twist is
 //! the same for all. A frame's stamp is that of its colour.
@@ -46,6 +46,8 @@ pub(super) struct Listed {
     pub(super) left_out: usize,
     /// A folder or a table, rather than one picture.
     pub(super) several: bool,
+    /// What of a table is not read.
+    pub(super) notes: Vec<String>,
 }
 
 /// A key of FRAME.toml and what is wrong with it.
@@ -58,7 +60,10 @@ pub(super) fn frames(spec: &FrameSpec, path: &Path) -> Result<Listed, FrameFileE
     let mut listed = match (&spec.frames, &spec.color) {
         (Some(_), Some(_)) => return Err(key(path, "frames", "is a table that names the pictures: leave color and depth out, or frames")),
         (Some(_), None) if spec.depth.is_some() => return Err(key(path, "frames", "names depth pictures too: leave depth out, or frames")),
-        (Some(table), None) => Listed { entries: read_table(table)?, left_out: 0, several: true },
+        (Some(table), None) => {
+            let (entries, notes) = read_table(table)?;
+            Listed { entries, left_out: 0, several: true, notes }
+        }
         (None, None) => return Err(key(path, "color", "is missing, and has no default; add it, or frames = \"frames.csv\"")),
         (None, Some(color)) => match Pictures::of(color) {
             Pictures::One => return one(spec, color, path),
@@ -101,7 +106,7 @@ fn one(spec: &FrameSpec, color: &Path, path: &Path) -> Result<Listed, FrameFileE
         return Err(key(path, "depth", "names many pictures, and color names one"));
     }
     let entry = Entry { color: color.into(), depth: spec.depth.clone(), stamp_ns: None };
-    Ok(Listed { entries: vec![entry], left_out: 0, several: false })
+    Ok(Listed { entries: vec![entry], left_out: 0, several: false, notes: Vec::new() })
 }
 
 /// Colour and depth from patterns or lists.
@@ -114,7 +119,7 @@ fn paired(spec: &FrameSpec, color: &Path, pictures: &Pictures, path: &Path) -> R
     let colors = read("color", color)?;
     let Some(depth) = &spec.depth else {
         let entries = colors.into_iter().map(|item| Entry { color: item.path, depth: None, stamp_ns: item.stamp_ns }).collect();
-        return Ok(Listed { entries, left_out: 0, several: true });
+        return Ok(Listed { entries, left_out: 0, several: true, notes: Vec::new() });
     };
     let by_name = *pictures == Pictures::Pattern && Pictures::of(depth) == Pictures::Pattern && spec.name_unit.is_none();
     if by_name {
@@ -147,7 +152,7 @@ fn by_names(colors: Vec<Item>, depth: &Path, path: &Path) -> Result<Listed, Fram
         }
         entries.push(Entry { color: item.path, depth: Some(depth), stamp_ns: item.stamp_ns });
     }
-    Ok(Listed { entries, left_out: 0, several: true })
+    Ok(Listed { entries, left_out: 0, several: true, notes: Vec::new() })
 }
 
 /// Each depth picture goes to one colour at most, the nearest pairs first.
@@ -186,7 +191,7 @@ fn by_times(colors: Vec<Item>, depths: Vec<Item>, max_gap_ms: f64, path: &Path) 
     let entry = |(color, depth): (Item, Option<usize>)| {
         depth.map(|j| Entry { color: color.path, depth: Some(depths[j].path.clone()), stamp_ns: color.stamp_ns })
     };
-    Ok(Listed { entries: with_depth.filter_map(entry).collect(), left_out, several: true })
+    Ok(Listed { entries: with_depth.filter_map(entry).collect(), left_out, several: true, notes: Vec::new() })
 }
 
 /// Times by `fps` for frames that have none.

@@ -26,6 +26,7 @@ pub struct FrameSet {
     left_out: usize,
     several: bool,
     moves: Moves,
+    notes: Vec<String>,
 }
 
 #[derive(Clone, Debug)]
@@ -47,8 +48,9 @@ enum Moves {
 pub fn read_frame_set(path: &Path) -> Result<FrameSet, FrameFileError> {
     let spec = read_spec(path)?;
     let listed = frames(&spec, path)?;
-    let moves = read_moves(&spec, &listed.entries, listed.several, path)?;
-    Ok(FrameSet { path: path.into(), entries: listed.entries, left_out: listed.left_out, several: listed.several, spec, moves })
+    let mut notes = listed.notes;
+    let moves = read_moves(&spec, &listed.entries, listed.several, path, &mut notes)?;
+    Ok(FrameSet { path: path.into(), entries: listed.entries, left_out: listed.left_out, several: listed.several, spec, moves, notes })
 }
 
 impl FrameSet {
@@ -62,6 +64,12 @@ impl FrameSet {
     #[must_use]
     pub fn left_out(&self) -> usize {
         self.left_out
+    }
+
+    /// What of the tables is not read.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// When the pictures were taken, seconds from their stamps.
@@ -92,7 +100,7 @@ impl FrameSet {
     pub fn motion(&self, index: usize) -> Result<Motion, FrameFileError> {
         match &self.moves {
             Moves::Twist(twist) => Ok(Motion::Twist(*twist)),
-            Moves::Flow(flow) => Ok(Motion::Flow(read_flow(flow, &self.spec.motion)?)),
+            Moves::Flow(flow) => Ok(Motion::Flow(read_flow(flow, &self.spec.motion)?.0)),
             Moves::Poses { table, rows, base_s } => {
                 let stamp_s = self.stamp_s(index).unwrap_or(*base_s);
                 let track = PoseTrack::new(rows.clone(), stamp_s - base_s);
@@ -110,7 +118,14 @@ impl FrameSet {
             let message = format!("has {} frames; there is none of number {index}", self.entries.len());
             return Err(FrameFileError::Key { path: self.path.clone(), key: "frames", message });
         };
-        let file = read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), self.motion(index)?, &self.path)?;
+        let (motion, flow_origin_px) = match &self.moves {
+            Moves::Flow(flow) => {
+                let (flow, origin_px) = read_flow(flow, &self.spec.motion)?;
+                (Motion::Flow(flow), origin_px)
+            }
+            _ => (self.motion(index)?, None),
+        };
+        let (file, color_origin_px) = read_pictures(&self.spec, &entry.color, entry.depth.as_deref(), motion, &self.path)?;
         if let (Moves::Flow(path), Motion::Flow(flow)) = (&self.moves, &file.motion) {
             let [[w, h], [width, height]] = [flow.size_px, file.frame.geometry.size_px];
             if [w, h] != [width, height] {
@@ -118,6 +133,13 @@ impl FrameSet {
                     path,
                     format!("is of {w}x{h} pixels, and the colour of {width}x{height}: flow and colour must have one size"),
                 ));
+            }
+            if let (Some(flow_px), Some(color_px)) = (flow_origin_px, color_origin_px)
+                && flow_px != color_px
+            {
+                let message =
+                    format!("begins at pixel {flow_px:?} of its file, the colour at {color_px:?}: they must cover the same pixels");
+                return Err(failure(path, message));
             }
         }
         Ok(file)
@@ -135,7 +157,7 @@ fn seconds(stamp_ns: i64) -> f64 {
 }
 
 /// A twist (nothing given is no motion) or a table of poses, not both.
-fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path) -> Result<Moves, FrameFileError> {
+fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path, notes: &mut Vec<String>) -> Result<Moves, FrameFileError> {
     let motion = &spec.motion;
     let fail = |key, message: &str| Err(FrameFileError::Key { path: path.into(), key, message: message.to_owned() });
     if let Some(flow) = &motion.flow {
@@ -180,7 +202,8 @@ fn read_moves(spec: &FrameSpec, entries: &[Entry], several: bool, path: &Path) -
     if !base_s.is_finite() {
         return fail("motion.stamp_s", "must be a finite number of seconds on the clock of motion.trajectory");
     }
-    let rows = read_poses(trajectory, motion.trajectory_format, base_s)?;
+    let (rows, of_table) = read_poses(trajectory, motion.trajectory_format, base_s)?;
+    notes.extend(of_table);
     let moves = Moves::Poses { table: trajectory.clone(), rows, base_s };
     Ok(moves)
 }

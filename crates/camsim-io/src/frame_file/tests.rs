@@ -115,12 +115,15 @@ fn depth_that_means_nothing_is_refused_and_sky_is_not() {
     let of_exr = "color = \"c.png\"\ndepth = \"z.exr\"\nfocal_px = [2, 2]\n";
     for (text, expected) in [
         (format!("{of_exr}depth_encoding = \"packed24\"\n"), "FRAME.toml: depth_encoding: \"packed24\" is of 8-bit RGB pictures"),
-        (format!("{of_exr}depth_per_metre = 1000\n"), "depth_per_metre: is for whole numbers"),
+        (format!("{of_exr}depth_per_metre = 1e-4\n"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "1e-300"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "1e300"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("1000", "nan"), "depth_per_metre: must be 0.001 to 1e6"),
         (GOOD.replace("depth_per_metre = 1000", "depth_encoding = \"packed24\""), "d.png: is no 8-bit RGB picture"),
-        (format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"), "depth_per_metre: is for whole numbers"),
+        (
+            format!("{GOOD}depth_encoding = \"packed24\"\n").replace("d.png", "c.png"),
+            "depth_per_metre: is for numbers; bytes of depth_encoding have their own formula",
+        ),
     ] {
         fs::write(&path, &text).unwrap();
         let error = read_frame(&path).unwrap_err().to_string();
@@ -138,7 +141,7 @@ fn bad_frames_are_named_by_key_and_file() {
         (&format!("{GOOD}depth_kind = \"ranged\"\n"), "did you mean \"range\"?"),
         (&GOOD.replace("[2, 2]", "[2, -2]"), "focal_px: must be"),
         (&GOOD.replace("depth_per_metre = 1000\n", ""), "depth_per_metre: is missing"),
-        (&GOOD.replace("d.png", "c.png"), "c.png: is no 16-bit grey picture"),
+        (&GOOD.replace("d.png", "c.png"), "c.png: is an 8-bit RGB picture, whose bytes do not tell how depth was packed"),
         (&GOOD.replace("d.png", "no.png"), "no.png: cannot be read"),
         (&GOOD.replace("c.png", "d.csv"), "d.csv: cannot be read"),
         ("color = \"c.png\"\nfocal_px = [2, 2]\n[motion]\nvelocity_m_s = [0, 0, 1]\n", "depth: is missing, and the camera moves"),

@@ -7,7 +7,7 @@ use super::{GltfError, source::Source};
 /// Elements of an accessor, at most.
 const MOST: usize = 1 << 27;
 /// And without data.
-const MOST_EMPTY: usize = 1 << 21;
+pub(super) const MOST_EMPTY: usize = 1 << 21;
 
 /// Up to four numbers an element; those that it does not have are 0.
 pub(super) fn rows(source: &Source, accessor: &Accessor<'_>) -> Result<Vec<[f64; 4]>, GltfError> {

@@ -5,18 +5,11 @@ use std::path::Path;
 use gltf::json::validation::Error as Wrong;
 use serde_json::Value;
 
-use super::GltfError;
+use super::{
+    GltfError,
+    treatments::{How, refuse, treatment},
+};
 
-/// Extensions that a file may require: what they add is done here, or by the glTF crate.
-const DONE: &[&str] = &[
-    "KHR_mesh_quantization",
-    "EXT_mesh_gpu_instancing",
-    "KHR_texture_transform",
-    "KHR_materials_unlit",
-    "KHR_materials_pbrSpecularGlossiness",
-];
-/// Extensions that only change light and shade, which are not shown.
-const NO_MATTER: &[&str] = &["KHR_materials_", "KHR_lights_punctual", "KHR_animation_pointer"];
 /// Places that are told of; what is wrong in one is often wrong in all.
 const TOLD: usize = 3;
 
@@ -31,29 +24,40 @@ pub(super) fn check_version(json: &Value) -> Result<(), String> {
     }
 }
 
-/// Refuses extensions that a file requires, or that its textures or primitives have nothing but.
-pub(super) fn check_extensions(path: &Path, json: &Value) -> Result<(), GltfError> {
-    let required = list(json, "extensionsRequired").iter().filter_map(Value::as_str);
-    let known = |name: &str| DONE.contains(&name) || NO_MATTER.iter().any(|known| name.starts_with(known));
-    let alone = list(json, "textures").iter().filter(|texture| texture.get("source").is_none());
-    let alone = alone.filter_map(|texture| texture.get("extensions")?.as_object()?.keys().next().map(String::as_str));
-    let compressed = list(json, "meshes").iter().flat_map(|mesh| list(mesh, "primitives")).any(|primitive| is_compressed(json, primitive));
-    let compressed = compressed.then_some("KHR_draco_mesh_compression");
-    let Some(name) = required.filter(|name| !known(name)).chain(alone).chain(compressed).next() else { return Ok(()) };
-    let fix = match name {
-        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => "write the file again without compression",
-        "KHR_texture_basisu" | "EXT_texture_webp" | "EXT_texture_avif" => "write its pictures as PNG or JPEG",
-        _ => "write the file again without it",
-    };
-    Err(GltfError::Extension { path: path.into(), extension: name.into(), fix })
+/// Refuses extensions that a file requires, or that its textures, primitives or buffer views have nothing but.
+pub(super) fn check_extensions(path: &Path, json: &Value, has_blob: bool) -> Result<(), GltfError> {
+    let known = |name: &str| treatment(name).is_some_and(|(_, how, _)| matches!(how, How::Applied | How::NoMatter));
+    let required = list(json, "extensionsRequired").iter().filter_map(Value::as_str).filter(|name| !known(name));
+    let textures = list(json, "textures").iter().filter(|texture| texture.get("source").is_none());
+    let textures = textures.filter_map(|texture| texture.get("extensions")?.as_object());
+    let alone = textures.filter(|of| !of.contains_key("EXT_texture_webp")).filter_map(|of| of.keys().next().map(String::as_str));
+    let draco = list(json, "meshes").iter().flat_map(|mesh| list(mesh, "primitives")).any(|primitive| is_draco_alone(json, primitive));
+    let draco = draco.then_some("KHR_draco_mesh_compression");
+    let meshopt = list(json, "bufferViews").iter().filter_map(|view| meshopt_alone(json, view, has_blob));
+    // The file itself is named first for what it says of itself.
+    match required.chain(alone).chain(draco).chain(meshopt).next() {
+        Some(name) => Err(refuse(path, name)),
+        None => Ok(()),
+    }
 }
 
-/// Whether a primitive's corners are in no buffer but that of the extension.
-fn is_compressed(json: &Value, primitive: &Value) -> bool {
-    let position = primitive.pointer("/attributes/POSITION").and_then(Value::as_u64);
+/// Whether some of a primitive's corners or indices are in no buffer but that of the extension.
+fn is_draco_alone(json: &Value, primitive: &Value) -> bool {
     let has_data = |accessor: &Value| accessor.get("bufferView").is_some() || accessor.get("sparse").is_some();
+    let attributes = primitive.get("attributes").and_then(Value::as_object);
+    let used = attributes.into_iter().flat_map(|of| of.values()).chain(primitive.get("indices")).filter_map(Value::as_u64);
     primitive.pointer("/extensions/KHR_draco_mesh_compression").is_some()
-        && position.and_then(|index| list(json, "accessors").get(index as usize)).is_some_and(|accessor| !has_data(accessor))
+        && used.filter_map(|index| list(json, "accessors").get(index as usize)).any(|accessor| !has_data(accessor))
+}
+
+/// The extension of a buffer view whose bytes are compressed and nowhere else: its own buffer is a stand-in without any.
+fn meshopt_alone<'a>(json: &Value, view: &'a Value, has_blob: bool) -> Option<&'a str> {
+    let name = view.get("extensions")?.as_object()?.keys().find(|name| name.ends_with("_meshopt_compression"))?;
+    let index = view.get("buffer").and_then(Value::as_u64)? as usize;
+    let buffer = list(json, "buffers").get(index)?;
+    let is_fallback = buffer.pointer(&format!("/extensions/{name}/fallback")).and_then(Value::as_bool) == Some(true);
+    let is_blob = index == 0 && has_blob && !is_fallback;
+    (buffer.get("uri").is_none_or(Value::is_null) && !is_blob).then_some(name)
 }
 
 /// What the glTF crate takes for granted: accessors that it looks at before it knows that they are there, and nodes that are animated.
@@ -77,7 +81,7 @@ pub(super) fn check_numbers(json: &Value) -> Result<(), String> {
     Ok(())
 }
 
-fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
+pub(super) fn list<'a>(value: &'a Value, key: &str) -> &'a [Value] {
     value.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 

@@ -8,7 +8,11 @@ use gltf::{
     texture::{Info, MagFilter, WrappingMode},
 };
 
-use super::{GltfError, emitted, source::Source};
+use super::{
+    GltfError,
+    emitted::{self, Bake, Layer},
+    source::Source,
+};
 
 /// From this alpha on a blended surface has depth: a pixel has one, that of the surface most of its light is of.
 const BLEND_CUTOFF: f32 = 0.5;
@@ -47,6 +51,8 @@ pub(super) struct Materials<'a> {
     /// Of pictures with alpha that were asked, whether any of it is below 1.
     clear: HashMap<*const Texture, bool>,
     known: HashMap<Option<usize>, (Material, UvRule)>,
+    /// Of those whose emitted light lies otherwise than their base colour.
+    bakes: HashMap<Option<usize>, Bake>,
     pub notes: Vec<String>,
 }
 
@@ -60,7 +66,15 @@ const LARGE_PX: u64 = 1 << 26;
 impl<'a> Materials<'a> {
     pub fn new(source: &'a Source) -> Self {
         let white = Arc::new(Texture::uniform([255; 4], Encoding::Linear));
-        Self { source, white, textures: HashMap::new(), clear: HashMap::new(), known: HashMap::new(), notes: Vec::new() }
+        Self {
+            source,
+            white,
+            textures: HashMap::new(),
+            clear: HashMap::new(),
+            known: HashMap::new(),
+            bakes: HashMap::new(),
+            notes: Vec::new(),
+        }
     }
 
     pub fn of(&mut self, material: &gltf::Material<'_>) -> Result<(Material, UvRule), GltfError> {
@@ -73,9 +87,13 @@ impl<'a> Materials<'a> {
             Some(of) => ("extensions.KHR_materials_pbrSpecularGlossiness.diffuseFactor", of.diffuse_factor(), of.diffuse_texture()),
             None => ("pbrMetallicRoughness.baseColorFactor", base.base_color_factor(), base.base_color_texture()),
         };
-        let emitted = material.emissive_factor();
-        self.check_factors(material, [(key, &factor), ("emissiveFactor", &emitted)])?;
-        let emits = emitted.iter().any(|&part| part > 0.0);
+        let strength = self.source.emissive_strength(material.index());
+        let emitted = material.emissive_factor().map(|part| part * strength);
+        let emitted_key = if strength == 1.0 { "emissiveFactor" } else { "emissiveFactor times emissiveStrength" };
+        self.check_factors(material, [(key, &factor), (emitted_key, &emitted)])?;
+        let emitted = emitted.map(|part| part.clamp(0.0, 1.0));
+        // What is unlit has its base colour alone, by the definition of that.
+        let emits = !material.unlit() && emitted.iter().any(|&part| part > 0.0);
         // Alpha is the base colour's, black or not.
         let has_alpha = material.alpha_mode() != AlphaMode::Opaque;
         let black = factor[..3].iter().all(|&part| part == 0.0) && !(has_alpha && base_texture.is_some());
@@ -111,7 +129,7 @@ impl<'a> Materials<'a> {
             }
         };
         let with_light = match &on_top {
-            Some(light) => self.with_light(info.as_ref(), light, has_alpha, emitted, &mut rule)?,
+            Some(light) => self.with_light(material.index(), (info.as_ref(), light), has_alpha, emitted, &mut rule)?,
             None => None,
         };
         let (texture, wrap, nearest) = match (with_light, &info) {
@@ -138,7 +156,7 @@ impl<'a> Materials<'a> {
 
     /// Refuses factors that are no numbers, and says which are beyond what there is.
     fn check_factors(&mut self, material: &gltf::Material<'_>, factors: [(&str, &[f32]); 2]) -> Result<(), GltfError> {
-        let name = material.index().map_or_else(|| "the material of what has none".to_owned(), |index| format!("materials.{index}"));
+        let name = self.source.material_name(material.index());
         for (key, parts) in factors {
             if parts.iter().any(|part| !part.is_finite()) {
                 return Err(self.source.broken(format!("{name}: {key} is {parts:?}, which is not finite: give numbers from 0 to 1")));
@@ -161,33 +179,39 @@ impl<'a> Materials<'a> {
         if material.blends && !mixes { Material { blends: false, cutoff: None, ..material } } else { material }
     }
 
-    /// The base colour with a picture of emitted light on top; `None`, and a note, where they do not lie on each other texel by texel.
+    /// What is to be done to a shape of this material before it is shown.
+    pub fn bake_of(&self, material: &gltf::Material<'_>) -> Option<Bake> {
+        self.bakes.get(&material.index()).cloned()
+    }
+
+    /// The base colour with a picture of emitted light on top; `None` where they do not lie on each other, so that it takes a shape to say what does.
     fn with_light(
         &mut self,
-        base: Option<&Info<'_>>,
-        light: &Info<'_>,
+        material: Option<usize>,
+        (base, light): (Option<&Info<'_>>, &Info<'_>),
         has_alpha: bool,
         emitted: [f32; 3],
         rule: &mut UvRule,
     ) -> Result<Option<Textured>, GltfError> {
+        let layer = |(texture, wrap, nearest): Textured, rule: UvRule| Layer::new(texture, wrap, nearest, rule);
         let mut of_light = *rule;
-        let above = self.textured(light, false, &mut of_light)?;
+        let above = layer(self.textured(light, false, &mut of_light)?, of_light);
         let below = match base {
-            Some(info) => self.textured(info, has_alpha, rule)?,
+            Some(info) => layer(self.textured(info, has_alpha, rule)?, *rule),
             None => {
                 *rule = of_light;
-                (self.white.clone(), above.1, above.2)
+                Layer::new(self.white.clone(), above.wrap, above.nearest, of_light)
             }
         };
-        let place = |rule: &UvRule| (rule.set, rule.offset, rule.rotation, rule.scale);
+        let place = |of: &Layer| (of.rule.set, of.rule.offset, of.rule.rotation, of.rule.scale, of.wrap, of.nearest);
         let [r, g, b, alpha] = rule.factor;
-        let alike = place(rule) == place(&of_light) && (above.1, above.2) == (below.1, below.2);
-        let Some(both) = emitted::on_top(&below.0, [r, g, b], &above.0, emitted).filter(|_| alike) else {
-            self.notes.push("a picture of emitted light that does not lie on its base colour texel by texel is left out".into());
+        if place(&below) != place(&above) {
+            self.bakes.insert(material, Bake { base: below, light: above, emitted });
             return Ok(None);
-        };
+        }
+        let both = emitted::on_top(&below, [r, g, b], &above, emitted);
         *rule = UvRule { factor: [1.0, 1.0, 1.0, alpha], vertex_colors: false, loses_colors: true, takes_light: false, ..*rule };
-        Ok(Some((Arc::new(both), below.1, below.2)))
+        Ok(Some((Arc::new(both), below.wrap, below.nearest)))
     }
 
     fn textured(&mut self, info: &Info<'_>, has_alpha: bool, rule: &mut UvRule) -> Result<Textured, GltfError> {
@@ -216,7 +240,7 @@ impl<'a> Materials<'a> {
         let bytes = self.source.image(image)?;
         let number = image.index();
         let wrong = |reason: String| self.source.broken(format!("images.{number}: {reason}"));
-        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG or JPEG: {reason}; write it as one of them"));
+        let undecoded = |reason: String| wrong(format!("cannot be decoded as PNG, JPEG or WebP: {reason}; write it as one of them"));
         let [width, height] = crate::pictures::size_of_bytes(&bytes).map_err(undecoded)?;
         if width.max(height) > LARGEST_PX {
             return Err(wrong(format!("is of {width}x{height} px, and at most {LARGEST_PX} on a side can be shown: make it smaller")));

@@ -99,6 +99,21 @@ impl Making<'_> {
         })
     }
 
+    /// Texture coordinates of each corner by another rule than the shape's own.
+    pub fn uvs(&self, primitive: &gltf::Primitive<'_>, rule: &UvRule, count: usize) -> Result<Vec<[f32; 2]>, GltfError> {
+        let semantic = Semantic::TexCoords(rule.set);
+        let Some(accessor) = primitive.get(&semantic) else { return Ok(vec![rule.apply([0.0; 2]); count]) };
+        self.check(primitive, &semantic, &accessor)?;
+        let uvs: Vec<[f32; 2]> = accessor::rows(self.source, &accessor)?.iter().map(|row| rule.apply([row[0], row[1]])).collect();
+        if uvs.len() != count {
+            return Err(self.wrong(primitive, "its attributes have different numbers of elements"));
+        }
+        if uvs.iter().flatten().any(|part| !part.is_finite()) {
+            return Err(self.wrong(primitive, "a texture coordinate is not a finite number"));
+        }
+        Ok(uvs)
+    }
+
     /// The file's own normals, of any length.
     fn given_normals(&self, primitive: &gltf::Primitive<'_>, count: usize) -> Result<Option<Vec<DVec3>>, GltfError> {
         let Some(accessor) = primitive.get(&Semantic::Normals) else { return Ok(None) };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use serde_json::Value;
 
-use super::{GltfError, accessor, checks};
+use super::{GltfError, accessor, checks, mend, treatments};
 
 /// A file with everything that it needs.
 #[derive(Debug)]
@@ -14,6 +14,8 @@ pub(super) struct Source {
     pub document: gltf::Document,
     buffers: Vec<Vec<u8>>,
     json: Value,
+    /// What of the file is left out, or not as it seems.
+    pub notes: Vec<String>,
 }
 
 impl Source {
@@ -23,30 +25,37 @@ impl Source {
         if bytes.is_empty() {
             return Err(broken("is empty".into()));
         }
-        let (text, blob) = if bytes.starts_with(b"glTF") { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
+        let is_glb = bytes.starts_with(b"glTF");
+        let (text, blob) = if is_glb { split_glb(&bytes).map_err(broken)? } else { (&bytes[..], None) };
         let mut json: Value = serde_json::from_slice(without_mark(text)).map_err(|error| broken(format!("is no glTF: {error}")))?;
-        checks::check_extensions(path, &json)?;
-        if let Some(root) = json.as_object_mut() {
-            root.remove("extensionsRequired");
-        }
+        checks::check_extensions(path, &json, blob.is_some())?;
         checks::check_version(&json).map_err(broken)?;
         checks::check_numbers(&json).map_err(broken)?;
+        let mut notes = treatments::notes(&json);
+        let mended = mend::mend(&mut json).map_err(broken)?;
+        notes.extend(mended.notes);
         let root = serde_json::from_value(json.clone()).map_err(|error| broken(format!("is no glTF 2.0: {error}")))?;
         let document = gltf::Document::from_json(root).map_err(|error| broken(checks::in_words(error)))?;
         let mut buffers = Vec::new();
         for buffer in document.buffers() {
+            let index = buffer.index();
             let mut bytes = match buffer.source() {
-                gltf::buffer::Source::Bin => blob.unwrap_or_default().to_vec(),
-                gltf::buffer::Source::Uri(uri) => fetch(path, uri, &format!("buffers.{}", buffer.index()))?,
+                _ if mended.zeros == Some((index, buffer.length())) => vec![0; buffer.length()],
+                gltf::buffer::Source::Bin if index == 0 && is_glb => blob.unwrap_or_default().to_vec(),
+                gltf::buffer::Source::Bin => {
+                    let fix = "only the first buffer of a .glb file may have none: give it one, or write the file again";
+                    return Err(broken(format!("buffers.{index}: has no uri, so that its bytes are nowhere; {fix}")));
+                }
+                gltf::buffer::Source::Uri(uri) => fetch(path, uri, &format!("buffers.{index}"))?,
             };
             if bytes.len() < buffer.length() {
                 let (has, wants) = (bytes.len(), buffer.length());
-                return Err(broken(format!("buffers.{}: has {has} bytes where {wants} should be: the file is cut off", buffer.index())));
+                return Err(broken(format!("buffers.{index}: has {has} bytes where {wants} should be: the file is cut off")));
             }
             bytes.truncate(buffer.length());
             buffers.push(bytes);
         }
-        Ok(Self { path: path.into(), document, buffers, json })
+        Ok(Self { path: path.into(), document, buffers, json, notes })
     }
 
     pub fn broken(&self, message: impl Into<String>) -> GltfError {
@@ -75,6 +84,27 @@ impl Source {
         }
     }
 
+    /// Whether `KHR_node_visibility` lets a node, and what is below it, be seen.
+    pub fn is_visible(&self, node: usize) -> bool {
+        let pointer = format!("/nodes/{node}/extensions/KHR_node_visibility/visible");
+        self.json.pointer(&pointer).and_then(Value::as_bool).unwrap_or(true)
+    }
+
+    /// `KHR_materials_emissive_strength`: what emitted light is multiplied by.
+    pub fn emissive_strength(&self, material: Option<usize>) -> f32 {
+        let at = |material| format!("/materials/{material}/extensions/KHR_materials_emissive_strength/emissiveStrength");
+        material.and_then(|material| self.json.pointer(&at(material))?.as_f64()).unwrap_or(1.0) as f32
+    }
+
+    /// A material as messages call it: by number, and by name where it has one.
+    pub fn material_name(&self, material: Option<usize>) -> String {
+        let Some(index) = material else { return "the material of what has none".to_owned() };
+        match self.json.pointer(&format!("/materials/{index}/name")).and_then(Value::as_str) {
+            Some(name) => format!("materials.{index} ({name})"),
+            None => format!("materials.{index}"),
+        }
+    }
+
     /// Where `EXT_mesh_gpu_instancing` puts a node's mesh.
     pub fn instances(&self, node: usize) -> Result<Option<Vec<DAffine3>>, GltfError> {
         let pointer = format!("/nodes/{node}/extensions/EXT_mesh_gpu_instancing/attributes");
@@ -87,7 +117,13 @@ impl Source {
             accessor::rows(self, &accessor).map(Some)
         };
         let (shifts, turns, scales) = (of("TRANSLATION")?, of("ROTATION")?, of("SCALE")?);
-        let count = [&shifts, &turns, &scales].into_iter().flatten().map(Vec::len).min().unwrap_or(0);
+        let mut counts = [&shifts, &turns, &scales].into_iter().flatten().map(Vec::len);
+        let count = counts.next().unwrap_or(0);
+        if let Some(other) = counts.find(|&other| other != count) {
+            return Err(self.broken(format!(
+                "nodes.{node}: its instances have attributes of {count} and of {other} elements: TRANSLATION, ROTATION and SCALE need one of each"
+            )));
+        }
         let instance = |i: usize| {
             let [x, y, z, _] = shifts.as_ref().map_or([0.0; 4], |rows| rows[i]);
             let turn = turns.as_ref().map_or(DQuat::IDENTITY, |rows| DQuat::from_array(rows[i]).normalize());

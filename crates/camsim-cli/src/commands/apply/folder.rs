@@ -265,8 +265,18 @@ fn render(
     let writer = FrameWriter::new(files, 1);
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let mut unseen = UnseenCounts::default();
+    let mut told = Vec::new();
     for &index in todo {
         let file = read(args, set, index as usize, console)?;
+        for note in &file.notes {
+            // Of one kind the first is enough: the next is of another file, with another number.
+            let (file, what) = note.split_once(": ").unwrap_or(("", note));
+            let kind = what.split(|letter: char| letter.is_ascii_digit()).next().unwrap_or_default().to_owned();
+            if !told.contains(&kind) {
+                console.warn(format_args!("{file}: {what} (others like it are not told of)"));
+                told.push(kind);
+            }
+        }
         let settings = settings(args, &file, index);
         let pipeline = Pipeline::new(spec, &file.frame, &file.motion, &settings).map_err(|error| in_file(args, &error)).or_bad_input()?;
         let (picture, counts) = pipeline.render_and_count(vignette);

@@ -92,7 +92,7 @@ fn what_is_wrong_with_a_depth_is_said() {
         ("d.pfm", of("Pf\n3 2\n0\n"), rows, "scale `0`"),
         ("d.pfm", of("Pf\n2 3\n-1\n"), rows, "is 2x3, but the colour is 3x2"),
         ("d.pfm", good.clone(), "depth_rows = \"down\"\n", "top-down"),
-        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_per_metre = 100\n", "PFM, TIFF of floats and packed24 are in metres"),
+        ("d.pfm", good.clone(), "depth_rows = \"top-down\"\ndepth_per_metre = 1e7\n", "depth_per_metre: must be 0.001 to 1e6"),
         (
             "d.pfm",
             good.clone(),

@@ -3,7 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::{Entry, key};
-use crate::frame_file::{FrameFileError, NameUnit, poses::words_of};
+use crate::frame_file::{
+    FrameFileError, NameUnit,
+    columns::{Column, column},
+    poses::words_of,
+};
 
 /// A picture with its time.
 pub(super) struct Item {
@@ -81,11 +85,11 @@ pub(super) fn read_list(path: &Path) -> Result<Vec<Item>, FrameFileError> {
     if items.is_empty() { Err(row(path, None, "names no picture")) } else { Ok(items) }
 }
 
-/// `frames.csv`, or a text of `time color` or `time color time depth`.
-pub(super) fn read_table(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
+/// `frames.csv`, or a text of `time color` or `time color time depth`; with what there is to say about it.
+pub(super) fn read_table(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
     let of_text = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("txt"));
-    let entries = if of_text { read_associations(path)? } else { read_csv(path)? };
-    if entries.is_empty() { Err(row(path, None, "names no frame")) } else { Ok(entries) }
+    let (entries, notes) = if of_text { (read_associations(path)?, Vec::new()) } else { read_csv(path)? };
+    if entries.is_empty() { Err(row(path, None, "names no frame")) } else { Ok((entries, notes)) }
 }
 
 fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
@@ -103,7 +107,34 @@ fn read_associations(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
     Ok(entries)
 }
 
-fn read_csv(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
+/// Where the time is in a row of `frames.csv`, and its unit.
+fn time_of(header: &csv::StringRecord) -> Result<Option<(usize, NameUnit)>, String> {
+    // camsim's own tables say it as exactly as they can, whatever else they say.
+    if let Some(at) = header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case("stamp_ns")) {
+        return Ok(Some((at, NameUnit::Ns)));
+    }
+    let is_time = |name: &str| name.trim_start_matches('\u{feff}').to_lowercase().starts_with('t');
+    let times = header.iter().enumerate().filter(|(_, cell)| match column(cell) {
+        Column::Time(_) => true,
+        Column::WrongUnit => is_time(cell),
+        _ => false,
+    });
+    let times: Vec<(usize, &str)> = times.collect();
+    match times[..] {
+        [] => Ok(None),
+        [(at, cell)] => match column(cell) {
+            Column::Time(Some(unit)) => {
+                let known = [(1.0, NameUnit::S), (1e-3, NameUnit::Ms), (1e-6, NameUnit::Us), (1e-9, NameUnit::Ns)];
+                let known = known.into_iter().find(|(factor, _)| *factor == unit.factor);
+                known.map(|(_, unit)| Some((at, unit))).ok_or_else(|| format!("the column `{cell}` is in minutes: give t_s"))
+            }
+            _ => Err(format!("the column `{cell}` does not say its unit, or one that is not known: call it t_s, t_ms, t_us or t_ns")),
+        },
+        [(_, a), (_, b), ..] => Err(format!("the header names two columns of time, `{a}` and `{b}`: leave one out")),
+    }
+}
+
+fn read_csv(path: &Path) -> Result<(Vec<Entry>, Vec<String>), FrameFileError> {
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
@@ -114,10 +145,27 @@ fn read_csv(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
         names.iter().find_map(|name| header.iter().position(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)))
     };
     let Some(color_at) = place(&["color", "color_exr", "color_png"]) else {
-        return Err(row(path, Some(1), "the header names no column color; the columns are t_s (or stamp_ns), color, depth"));
+        return Err(row(
+            path,
+            Some(1),
+            "the header names no column color; the columns are t_s (or stamp_ns, t_ms, t_us, t_ns), color, depth",
+        ));
     };
     let depth_at = place(&["depth"]);
-    let time_at = place(&["stamp_ns"]).map(|at| (at, NameUnit::Ns)).or_else(|| place(&["t_s"]).map(|at| (at, NameUnit::S)));
+    let time_at = time_of(&header).map_err(|message| row(path, Some(1), message))?;
+    let twice = |name: &str| header.iter().filter(|cell| cell.trim_start_matches('\u{feff}').eq_ignore_ascii_case(name)).count() > 1;
+    if let Some(name) = ["color", "color_exr", "color_png", "depth", "stamp_ns"].into_iter().find(|name| twice(name)) {
+        return Err(row(path, Some(1), format!("the header names two columns {name}: leave one out")));
+    }
+    // camsim's own tables tell more than is needed here.
+    let is_own = place(&["frame"]).is_some() && place(&["stamp_ns"]).is_some();
+    let read = [Some(color_at), depth_at, time_at.map(|(at, _)| at), place(&["frame"])];
+    let unread: Vec<&str> =
+        header.iter().enumerate().filter(|(at, _)| !is_own && !read.contains(&Some(*at))).map(|(_, cell)| cell).collect();
+    let notes = match unread[..] {
+        [] => Vec::new(),
+        _ => vec![format!("{}: the columns {} are not read: frames are of t_s, color and depth", path.display(), unread.join(", "))],
+    };
     let mut entries: Vec<Entry> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| row(path, error.position().map(csv::Position::line), error.to_string()))?;
@@ -128,7 +176,7 @@ fn read_csv(path: &Path) -> Result<Vec<Entry>, FrameFileError> {
         let depth = depth_at.map(|at| picture(path, line, cell(at))).transpose()?;
         entries.push(Entry { color: picture(path, line, cell(color_at))?, depth, stamp_ns });
     }
-    Ok(entries)
+    Ok((entries, notes))
 }
 
 /// Words of the lines that are no comments, with the line's number.
@@ -145,7 +193,8 @@ fn stamp(path: &Path, line: u64, text: &str, before: Option<i64>) -> Result<i64,
 
 /// Later than the row before.
 fn stamp_in(path: &Path, line: u64, text: &str, unit: NameUnit, before: Option<i64>) -> Result<i64, FrameFileError> {
-    let stamp_ns = nanoseconds(text, unit).ok_or_else(|| row(path, Some(line), format!("`{text}` is no time")))?;
+    let in_seconds = if unit == NameUnit::S { " in seconds; of another unit give a .csv with the column t_ms, t_us or t_ns" } else { "" };
+    let stamp_ns = nanoseconds(text, unit).ok_or_else(|| row(path, Some(line), format!("`{text}` is no time{in_seconds}")))?;
     if before.is_some_and(|before| stamp_ns <= before) {
         return Err(row(path, Some(line), "is not later than the row before; sort by time and leave doubles out"));
     }

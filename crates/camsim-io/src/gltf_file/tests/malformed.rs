@@ -5,18 +5,18 @@ use serde_json::{Value, json};
 use super::*;
 
 /// A square with a picture, vertex colours and indices, in one buffer.
-struct Good {
-    json: Value,
-    bytes: Vec<u8>,
+pub(super) struct Good {
+    pub json: Value,
+    pub bytes: Vec<u8>,
 }
 
-fn png(width: u32, height: u32) -> Vec<u8> {
+pub(super) fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     image::RgbImage::new(width, height).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()
 }
 
-fn good(picture: &[u8]) -> Good {
+pub(super) fn good(picture: &[u8]) -> Good {
     let parts = [
         floats(&[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 2.0, 2.0, 0.0]),
         floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
@@ -47,7 +47,7 @@ fn good(picture: &[u8]) -> Good {
 }
 
 impl Good {
-    fn read(&self) -> Result<Model, String> {
+    pub fn read(&self) -> Result<Model, String> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
         let path = folder.path().join("model.gltf");
@@ -58,7 +58,7 @@ impl Good {
 }
 
 /// Reads the good model with `value` at each of these places; null takes out what is there.
-fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
+pub(super) fn with(changes: &[(&str, Value)]) -> Result<Model, String> {
     let mut good = good(&png(4, 4));
     for (pointer, value) in changes {
         let (parent, key) = pointer.rsplit_once('/').unwrap();
@@ -124,7 +124,7 @@ fn what_is_not_there_is_named_with_its_place() {
         (vec![("/asset", json!({ "version": "2.0", "minVersion": "2.9" }))], "needs glTF 2.9 (asset.minVersion)"),
         (vec![("/asset", Value::Null)], "has no asset.version"),
         (vec![("/nodes/0/mesh", json!(5))], "is not valid: nodes[0].mesh names what is not there; write the file again"),
-        (vec![("/bufferViews/4/byteLength", json!(0))], "images.0: cannot be decoded as PNG or JPEG: it has no bytes"),
+        (vec![("/bufferViews/4/byteLength", json!(0))], "images.0: cannot be decoded as PNG, JPEG or WebP: it has no bytes"),
     ] {
         let error = with(&changes).unwrap_err();
         assert!(error.contains(wanted), "{changes:?}\n  gives {error}\n  not   {wanted}");
@@ -158,7 +158,7 @@ fn pictures_of_any_size_are_shown_or_named() {
     assert!(good(&claims).read().unwrap_err().contains("images.0: "));
     for bytes in [&b"hello"[..], b"\xabKTX 20\xbb\r\n\x1a\n", &png(4, 4)[..40]] {
         let error = good(bytes).read().unwrap_err();
-        assert!(error.contains("images.0: cannot be decoded as PNG or JPEG: "), "{error}");
+        assert!(error.contains("images.0: cannot be decoded as PNG, JPEG or WebP: "), "{error}");
     }
 }
 

@@ -1,0 +1,124 @@
+//! What is between the world and the sensor's numbers: zoom tracks and vignettes, and what there is to say about them.
+
+use camsim_core::{
+    flight_log::FlightLog,
+    scenario::{CameraSpec, Scenario},
+    sequence::{GrayImage, Sequence},
+};
+
+use super::LoadError;
+use crate::frame_file::columns::{Column, column};
+
+/// A vignette whose brightest value is below this may be of fewer bits than it is stored in.
+const DIM: f32 = 0.5;
+/// Sides of a vignette and a picture that are in the same relation to this have one shape.
+const SAME_SHAPE: f64 = 0.01;
+
+/// `t_s,zoom` on the log's clock, brought to path time.
+pub(super) fn load_zoom_track(scenario: &Scenario, log: &FlightLog) -> Result<Vec<(f64, f64)>, LoadError> {
+    let camera = &scenario.camera;
+    let Some(path) = &camera.zoom_track else {
+        return if camera.zoom.is_empty() { Ok(Vec::new()) } else { Err(LoadError::ZoomPair) };
+    };
+    if camera.zoom.is_empty() {
+        return Err(LoadError::ZoomPair);
+    }
+    let fail = |line: Option<u64>, problem: String| LoadError::ZoomTrack {
+        path: path.clone(),
+        line: line.map_or(String::new(), |line| format!(", line {line}")),
+        problem,
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(|error| fail(None, error.to_string()))?;
+    let header = reader.headers().map_err(|error| fail(None, error.to_string()))?.clone();
+    let (second_s, is_zoom) = match (header.get(0).map(column), header.get(1), header.len()) {
+        (Some(Column::Time(Some(unit))), Some(zoom), 2) => (unit.factor, zoom.eq_ignore_ascii_case("zoom")),
+        _ => (1.0, false),
+    };
+    if !is_zoom {
+        let found = header.iter().collect::<Vec<_>>().join(",");
+        return Err(fail(Some(1), format!("the header is `{found}` and not `t_s,zoom` (or t_ms, t_us, t_ns)")));
+    }
+    let epoch_s = log.epoch_ns as f64 * 1e-9;
+    let mut rows: Vec<(f64, f64)> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| fail(error.position().map(csv::Position::line), error.to_string()))?;
+        let line = record.position().map(csv::Position::line);
+        let number = |at: usize| {
+            let text = record.get(at).unwrap_or_default();
+            text.parse::<f64>().map_err(|_| fail(line, format!("`{text}` is no number")))
+        };
+        let (t_s, zoom) = (second_s * number(0)?, number(1)?);
+        let at = ((t_s - epoch_s) / scenario.flight.speed, zoom);
+        if !at.0.is_finite() || !zoom.is_finite() || rows.last().is_some_and(|last| last.0 >= at.0) {
+            return Err(fail(line, format!("the row t_s = {t_s}, zoom = {zoom} is not finite or not later than the one before")));
+        }
+        rows.push(at);
+    }
+    if rows.is_empty() { Err(fail(None, "there are no rows".into())) } else { Ok(rows) }
+}
+
+/// What there is to say about a sequence's zoom track and vignette.
+pub(super) fn optics_warnings(sequence: &Sequence) -> Vec<String> {
+    let camera = &sequence.scenario.camera;
+    let vignette = sequence.vignette.as_deref().map(|map| vignette_warnings(camera, map)).unwrap_or_default();
+    zoom_warnings(sequence).into_iter().chain(vignette).collect()
+}
+
+/// Of rows that end before the flight does, and of values that nothing was calibrated for, the nearest is taken.
+fn zoom_warnings(sequence: &Sequence) -> Vec<String> {
+    let camera = &sequence.scenario.camera;
+    let (Some(path), Some(first), Some(last)) = (&camera.zoom_track, sequence.zoom_track.first(), sequence.zoom_track.last()) else {
+        return Vec::new();
+    };
+    let path = path.display();
+    let mut warnings = Vec::new();
+    let end_s = sequence.start_s + (sequence.frames.saturating_sub(1)) as f64 / camera.fps;
+    let (before_s, after_s) = (first.0 - sequence.start_s, end_s - last.0);
+    // A frame is no gap.
+    let frame_s = 1.0 / camera.fps + 1e-9;
+    if before_s > frame_s || after_s > frame_s {
+        warnings.push(format!(
+            "{path}: camera.zoom_track covers {:.3} s to {:.3} s after the log's first row, the frames {:.3} s to {end_s:.3} s: beyond it the first or last zoom \
+             is held; check that both have one clock",
+            first.0, last.0, sequence.start_s
+        ));
+    }
+    let known = camera.zoom.iter().map(|entry| entry.at);
+    let [least, most] = known.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, most], at| [at.min(least), at.max(most)]);
+    let values = || sequence.zoom_track.iter().map(|row| row.1);
+    let beyond = values().filter(|zoom| *zoom < least || *zoom > most).count();
+    if beyond > 0 {
+        let [low, high] = values().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], zoom| [zoom.min(low), zoom.max(high)]);
+        warnings.push(format!(
+            "{path}: {beyond} of {} rows of camera.zoom_track are beyond what camera.zoom is given for, {low} to {high} where {least} to {most} are known: the \
+             nearest is taken",
+            sequence.zoom_track.len()
+        ));
+    }
+    warnings
+}
+
+/// What a vignette looks as if it were not.
+#[must_use]
+pub fn vignette_warnings(camera: &CameraSpec, map: &GrayImage) -> Vec<String> {
+    let Some(path) = &camera.photometric.vignette else { return Vec::new() };
+    let path = path.display();
+    let mut warnings = Vec::new();
+    let brightest = map.values.iter().copied().fold(0.0, f32::max);
+    if brightest < DIM {
+        warnings.push(format!(
+            "{path}: the brightest value of the vignette is {:.1} % of what it can be: if it is of fewer bits than it is stored in, scale it up",
+            100.0 * brightest
+        ));
+    }
+    let shape = |[width, height]: [u32; 2]| f64::from(width) / f64::from(height);
+    if (shape(map.size_px) / shape(camera.size_px) - 1.0).abs() > SAME_SHAPE {
+        let ([w, h], [width, height]) = (map.size_px, camera.size_px);
+        warnings.push(format!("{path}: the vignette is of {w}x{h} pixels and is stretched to the picture's {width}x{height}"));
+    }
+    warnings
+}
