@@ -225,7 +225,15 @@ const JUMP_M_S: f64 = 1000.0;
 pub fn read_flight_log(path: &Path, spec: &FlightSpec, height: HeightConversion) -> Result<FlightLog, FlightLogError> {
     let raw = read_raw_rows(path, spec)?;
     let options = LogOptions::from_spec(spec, height);
-    let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|source| FlightLogError::Log { path: path.to_owned(), source })?;
+    let mut log = FlightLog::from_raw(&raw.rows, &options).map_err(|source| {
+        // A header may have something like an attitude.
+        let of_attitude: Vec<&str> =
+            raw.notes.iter().filter(|note| note.text.contains("attitude")).map(|note| note.text.as_str()).collect();
+        if source == LogError::NoAttitude && !of_attitude.is_empty() {
+            return FlightLogError::Values { path: path.to_owned(), problem: format!("{source}: {}", of_attitude.join("; ")) };
+        }
+        FlightLogError::Log { path: path.to_owned(), source }
+    })?;
     log.notes = raw.notes;
     // Local positions may have any unit of length.
     if raw.rows.iter().any(|row| matches!(row.position, RawPosition::Geodetic(_))) {

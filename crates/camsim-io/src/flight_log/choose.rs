@@ -2,7 +2,7 @@
 
 use camsim_core::{
     flight_log::Note,
-    scenario::{FlightSpec, HeightReference, LogFormat},
+    scenario::{AttitudeSource, FlightSpec, HeightReference, LogFormat},
 };
 
 use super::{
@@ -180,6 +180,12 @@ pub(super) fn position_columns(
             LogFormat::Auto => return Err(axes_unknown(header, &[x, y])),
             _ => return Err(named_otherwise()),
         };
+        let has_angles = any(Meaning::Roll) && any(Meaning::Pitch) && any(Meaning::Yaw) && !any(Meaning::Qw);
+        if frame == Frame::EastNorthUp && has_angles && spec.attitude == AttitudeSource::Log {
+            return Err(
+                "roll, pitch and yaw do not say what they turn where x is east and z is up: give a quaternion (qx, qy, qz, qw), or set flight.format = \"csv-xya\" or \"csv-ned\" if x is north".to_owned(),
+            );
+        }
         let vertical = match z {
             Some(z) => z,
             None => height_column(header, None, notes)?,
@@ -266,19 +272,20 @@ fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mu
         (_, None) => return Err(header.two(&all)),
     };
     header.check(column)?;
-    if let (Some(Meaning::Height(Some(datum))), Some(wanted)) = (header.means(column).map(|means| means.meaning), wanted) {
-        if datum != wanted {
-            warning(
-                notes,
-                format!(
-                    "the column `{}` says {}, flight.height says \"{}\": set flight.height = \"{}\", or rename the column",
-                    header.name(column),
-                    if datum == Datum::Ellipsoid { "above the ellipsoid" } else { "above mean sea level" },
-                    key(Some(wanted)),
-                    key(Some(datum))
-                ),
-            );
-        }
+    let stated = header.means(column).map(|means| means.meaning);
+    if let (Some(Meaning::Height(Some(datum))), Some(wanted)) = (stated, wanted)
+        && datum != wanted
+    {
+        warning(
+            notes,
+            format!(
+                "the column `{}` says {}, flight.height says \"{}\": set flight.height = \"{}\", or rename the column",
+                header.name(column),
+                if datum == Datum::Ellipsoid { "above the ellipsoid" } else { "above mean sea level" },
+                key(Some(wanted)),
+                key(Some(datum))
+            ),
+        );
     }
     let pressure = header.all(|meaning| meaning == Meaning::PressureHeight);
     if !all.is_empty() && !pressure.is_empty() {
@@ -295,12 +302,15 @@ pub(super) fn say_what_is_not_used(header: &Header, frame: Frame, attitude: Atti
     }
     let course = header.all(|meaning| meaning == Course);
     if !course.is_empty() && attitude == AttitudeColumns::None {
-        information(notes, format!("{} is where the aircraft moves, not where its nose points, and not used", header.list(&course)));
+        information(
+            notes,
+            format!("{} is where the aircraft moves, not where its nose points: no part of an attitude", header.list(&course)),
+        );
     }
-    if frame == Frame::Geodetic && matches!(attitude, AttitudeColumns::Quaternion(_)) {
+    if matches!(frame, Frame::Geodetic | Frame::NorthEastUp) && matches!(attitude, AttitudeColumns::Quaternion(_)) {
         warning(
             notes,
-            "quaternions beside latitudes are taken as turning forward-right-down bodies to north-east-down, as PX4 writes; ROS writes others".to_owned(),
+            "quaternions beside heights that count up are taken as turning forward-right-down bodies to north-east-down, as PX4 writes; ROS writes others".to_owned(),
         );
     }
 }

@@ -125,10 +125,12 @@ fn header_of(
     }
     let problem = |problem: String| FlightLogError::Header { path: path.to_owned(), line: line.number, problem };
     let mut header = Header::parse(&names);
-    if line.is_comment && !(table.fits(names.len()) && names_a_flight(&header)) {
-        if let Some(without_prose) = without_prose(table, line.text) {
-            header = without_prose;
-        }
+    let is_whole = table.fits(names.len()) && names_a_flight(&header);
+    if line.is_comment
+        && !is_whole
+        && let Some(without_prose) = without_prose(table, line.text)
+    {
+        header = without_prose;
     }
     if !names_a_flight(&header) {
         return if line.is_comment { Ok(None) } else { Err(problem(what_is_missing(&header))) };

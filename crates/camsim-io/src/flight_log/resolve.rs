@@ -25,6 +25,8 @@ const CREEPING_M_S: f64 = 0.05;
 const SLOW_M_S: f64 = 1.0;
 const APART_S: f64 = 2.0;
 const FAR_APART_S: f64 = 100.0;
+/// So few rows at one place may be written by hand.
+const FEW_ROWS: usize = 4;
 /// Faster than this the unit may be a larger one.
 const FAST_M_S: f64 = 340.0;
 /// Faster than this all the time, nothing that carries a camera flies.
@@ -45,6 +47,7 @@ pub(super) fn unit_of_key(key: TimeUnit) -> Option<&'static Unit> {
 
 /// How a log moves, its times in the file's unit.
 struct Motion {
+    rows: usize,
     largest: f64,
     /// Median; `None` with fewer than two times.
     step: Option<f64>,
@@ -131,7 +134,7 @@ fn guess(motion: &Motion, notes: &mut Vec<Note>) -> Result<f64, String> {
         || (!is_date_s && speed.is_some_and(|speed| !(STANDING_M_S..=IMPOSSIBLE_M_S).contains(&speed)));
     let doubtful = !is_date_s
         && match (speed, step_s) {
-            (None, step) => step.is_some_and(|step| step >= FAR_APART_S),
+            (None, step) => step.is_some_and(|step| step >= FAR_APART_S || (motion.all_whole && motion.rows > FEW_ROWS && step >= APART_S)),
             (Some(speed), step) => {
                 (speed > FAST_M_S && (motion.is_geodetic || !motion.all_whole))
                     || (motion.all_whole && speed < CREEPING_M_S)
@@ -235,7 +238,7 @@ fn motion(rows: &Rows, layout: &Layout) -> Motion {
     let length: f64 = moves.iter().map(|(_, distance)| distance.min(20.0 * usual)).sum();
     let duration: f64 = moves.iter().map(|(step, _)| step).sum();
     let pace = (length > 0.0 && duration > 0.0).then(|| length / duration);
-    Motion { largest, step, pace, all_whole, is_geodetic: geodetic }
+    Motion { rows: times.len(), largest, step, pace, all_whole, is_geodetic: geodetic }
 }
 
 fn distance_m(a: [f64; 3], b: [f64; 3], geodetic: bool) -> f64 {

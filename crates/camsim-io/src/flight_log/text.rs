@@ -243,8 +243,8 @@ fn without_last_blank<'a>(names: &[&'a str]) -> Vec<&'a str> {
 /// Whether a line has words and no values.
 fn is_header<'a>(line: &'a str, separator: Separator, fields: &mut Vec<&'a str>) -> bool {
     separator.split(line, fields);
-    let is_word = |field: &&str| !is_missing(field) && !is_value(field, separator != Separator::Comma);
-    fields.iter().any(is_word) && fields.iter().all(|field| is_word(&field) || is_missing(field))
+    let is_word = |field: &str| !is_missing(field) && !is_value(field, separator != Separator::Comma);
+    fields.iter().any(|field| is_word(field)) && fields.iter().all(|field| is_word(field) || is_missing(field))
 }
 
 /// A number or a time that is there.
@@ -262,10 +262,12 @@ pub(super) fn is_missing(field: &str) -> bool {
 /// A field's value: `None` if it is no number, NaN if it is missing.
 pub(super) fn number(field: &str, has_decimal_comma: bool) -> Option<f64> {
     // Rust also reads `infinity`; a column of that name is none of numbers.
-    if field.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | 'i' | 'I')) && !has_decimal_comma {
-        if let Ok(value) = field.parse() {
-            return Some(value);
-        }
+    let may_be_number = field.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '-' | '+' | '.' | 'i' | 'I'));
+    if may_be_number
+        && !has_decimal_comma
+        && let Ok(value) = field.parse()
+    {
+        return Some(value);
     }
     if is_missing(field) {
         return Some(f64::NAN);

@@ -111,6 +111,14 @@ fn several_columns_and_axes() {
         &["flight.attitude"],
     );
     // Axes.
+    for (header, format) in [("t,tx,ty,tz,roll,pitch,yaw", LogFormat::Auto), ("t,x,y,z,roll,pitch,yaw", LogFormat::Tum)] {
+        assert_refused(header, of(header, "T,0,N,H,9,9,30").as_bytes(), &spec(format), &["quaternion", "csv-xya"]);
+    }
+    assert_flies("angles by the key", &of("t,x,y,z,roll,pitch,yaw", "T,N,0,H,9,9,30"), &spec(LogFormat::CsvXya), "");
+    assert_flies("a quaternion in a world of heights", &of("t,north,east,alt,qw,qx,qy,qz", "T,N,0,H,1,0,0,0"), &auto(), "PX4");
+    let own = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
+    let row = "T,N,0,-H,0,0,0,0,0,0,1,0,0,0,0,0,0,0,0,0";
+    assert_flies("what `camsim track` writes", &of(own, row), &auto(), "");
     for header in ["t,x,y,z,qx,qy,qz,qw", "t,x,y,z,qw,qx,qy,qz", "t,pos_x,pos_y,pos_z,q_w,q_x,q_y,q_z", "t,x,y,alt,qw,qx,qy,qz"] {
         assert_refused(header, of(header, "T,N,0,H,0,0,0,1").as_bytes(), &auto(), &["flight.format", "csv-ned", "tum"]);
     }

@@ -106,6 +106,8 @@ fn units_of_time() {
         .map(|i| format!("{},{:.9},8,{},0,0,30\n", 10 * i, 47.0 + f64::from(i) * 8.994_6e-7, 500.0 + f64::from(i) * 0.01))
         .collect();
     assert_refused("100 Hz of milliseconds", format!("{header}\n{fast}").as_bytes(), &auto(), &["flight.time_unit"]);
+    let still: String = (0..21).map(|i| format!("{},0,0,0,0,0,{}\n", 20 * i, 10 * i)).collect();
+    assert_refused("a still camera and milliseconds", still.as_bytes(), &spec(LogFormat::CsvNed), &["flight.time_unit", "rows 20 s apart"]);
     let epoch = |per_second: f64| {
         let rows: String = (0..21)
             .map(|i| format!("{:.0},{:.9},8,{},0,0,30\n", (1.7e9 + f64::from(i)) * per_second, 47.0 + f64::from(i) * 8.994_6e-5, 500 + i))
