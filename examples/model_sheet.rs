@@ -123,6 +123,8 @@ fn sequence(state: BodyState, scene: Scene) -> Result<Arc<Sequence>, Box<dyn Err
     let flight = FlightSpec {
         log: "none".into(),
         format: Default::default(),
+        time_unit: Default::default(),
+        angle_unit: Default::default(),
         angles: Default::default(),
         attitude: Default::default(),
         origin: Default::default(),

@@ -70,7 +70,7 @@ pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Fa
     for warning in &loaded.warnings {
         console.warn(warning);
     }
-    console.detail(format_args!("{}: {}", scenario.flight.log.display(), loaded.log.report));
+    say_details(scenario, &loaded.log, console);
     Ok(loaded)
 }
 
@@ -80,7 +80,17 @@ pub fn load_flight_only(scenario: &Scenario, console: &mut Console<'_>) -> Resul
     for warning in flight_warnings(scenario, &log, &tracked) {
         console.warn(warning);
     }
+    say_details(scenario, &log, console);
     Ok((log, tracked))
+}
+
+/// What the reader of the log says that is open to no doubt.
+fn say_details(scenario: &Scenario, log: &FlightLog, console: &mut Console<'_>) {
+    let file = scenario.flight.log.display();
+    console.detail(format_args!("{file}: {}", log.report));
+    for note in log.notes.iter().filter(|note| !note.is_warning) {
+        console.detail(format_args!("{file}: {}", note.text));
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! [`CleaningReport`]. Nothing is repaired silently. The steps, in order:
 //!
 //! 1. rows without a usable time or position are dropped; unusable attitudes are marked as missing;
-//! 2. rows are sorted stably by time;
+//! 2. rows are sorted stably by time; zeros that stand for a missing fix or height are left out (`null_rows`);
 //! 3. heights change datum, positions become local NED, angles become rotations or (where turns count) stay angles;
 //! 4. position spikes are dropped, attitude glitches are marked as missing (`outliers`);
 //! 5. rows less than 1 ms apart are averaged into one;
@@ -20,13 +20,14 @@ use crate::{
 
 mod attitude;
 mod clean;
+mod null_rows;
 mod outliers;
 mod query;
 mod report;
 mod track_attitude;
 
 pub use attitude::body_from_euler_deg;
-pub use report::{CleaningReport, Finding};
+pub use report::{CleaningReport, Finding, Note};
 
 /// Position of a row as its file states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +45,7 @@ pub enum RawAttitude {
     EulerDeg([f64; 3]),
     /// Takes body (FRD) to north-east-down; any norm within 10 % of 1.
     Quaternion(DQuat),
-    /// The file states none.
+    /// The row states none. Where other rows do, it is interpolated between them, which is no repair.
     None,
 }
 
@@ -175,6 +176,8 @@ pub struct FlightLog {
     pub frame: Option<LocalFrame>,
     /// What was repaired.
     pub report: CleaningReport,
+    /// What its reader said about the file.
+    pub notes: Vec<Note>,
 }
 
 impl FlightLog {

@@ -58,6 +58,12 @@ pub struct FlightSpec {
     /// Column layout; `auto` detects it or refuses.
     #[serde(default)]
     pub format: LogFormat,
+    /// Unit of times whose column names none.
+    #[serde(default)]
+    pub time_unit: TimeUnit,
+    /// Unit of roll, pitch and yaw whose columns name none.
+    #[serde(default)]
+    pub angle_unit: AngleUnit,
     /// Whether angles wrap or count turns.
     #[serde(default)]
     pub angles: AngleKind,
@@ -95,6 +101,42 @@ pub enum LogFormat {
     Tum,
     /// `t_ns, x, y, z, qw, qx, qy, qz, ...`, world z up.
     Euroc,
+    /// Track points of a GPX file: latitude, longitude, height, time; no attitude.
+    Gpx,
+}
+
+/// Units of time in a flight log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TimeUnit {
+    /// Seconds, or what the values tell beyond doubt; refuse where they leave a doubt.
+    #[default]
+    Auto,
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+    /// Minutes.
+    Min,
+    /// Hours.
+    H,
+}
+
+/// Units of roll, pitch and yaw in a flight log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AngleUnit {
+    /// Degrees, or what the values tell beyond doubt; refuse where they leave a doubt.
+    #[default]
+    Auto,
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
 }
 
 /// How Euler angles in a log are to be read.

@@ -260,6 +260,8 @@ pub fn flight_warnings(scenario: &Scenario, log: &FlightLog, tracked: &Tracked) 
     if log.rows.len() == 1 {
         warnings.push(format!("{}: one usable row, so the platform stands still", scenario.flight.log.display()));
     }
+    let of_file = log.notes.iter().filter(|note| note.is_warning);
+    warnings.extend(of_file.map(|note| format!("{}: {}", scenario.flight.log.display(), note.text)));
     if !log.report.is_clean() {
         warnings.push(format!("{}: {}", scenario.flight.log.display(), log.report));
     }

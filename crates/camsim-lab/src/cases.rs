@@ -357,6 +357,8 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
         flight: FlightSpec {
             log: "in-memory".into(),
             format: Default::default(),
+            time_unit: Default::default(),
+            angle_unit: Default::default(),
             angles: Default::default(),
             attitude: Default::default(),
             origin: Default::default(),

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{
     CleaningReport, FlightLog, HeightConversion, LogError, LogOptions, LogRow, RawAttitude, RawPosition, RawRow,
     attitude::{self, Attitude},
+    null_rows,
     outliers::{self, Channel},
     track_attitude,
 };
@@ -32,6 +33,8 @@ struct Row {
     t_ns: i64,
     position_ned_m: DVec3,
     attitude: Attitude,
+    /// The file states an attitude here, usable or not.
+    states_attitude: bool,
 }
 
 pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, LogError> {
@@ -45,6 +48,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
     }
     check_one_kind(&usable)?;
     sort_by_time(&mut usable, &mut report);
+    null_rows::drop(&mut usable, &mut report);
 
     let uses_log_attitude = options.attitude == AttitudeSource::Log;
     let continuous = uses_log_attitude && attitude::is_continuous(&usable, options.angles);
@@ -91,7 +95,7 @@ pub(super) fn clean(raw: &[RawRow], options: &LogOptions) -> Result<FlightLog, L
         report.repaired_s = times.map(|t_ns| seconds_between(epoch_ns, t_ns) / options.speed).collect();
         report.repaired_s.sort_by(f64::total_cmp);
     }
-    Ok(FlightLog { rows: log_rows, epoch_ns, frame, report })
+    Ok(FlightLog { rows: log_rows, epoch_ns, frame, report, notes: Vec::new() })
 }
 
 fn check_options(options: &LogOptions) -> Result<(), LogError> {
@@ -168,7 +172,9 @@ fn localise(usable: &[&RawRow], options: &LogOptions, continuous: bool) -> (Vec<
                 }
                 RawPosition::Ned(ned) => ned,
             };
-            row.t_ns.map(|t_ns| Row { line: row.line, t_ns, position_ned_m, attitude: Attitude::from_raw(row.attitude, continuous) })
+            let attitude = Attitude::from_raw(row.attitude, continuous);
+            let states_attitude = row.attitude != RawAttitude::None;
+            row.t_ns.map(|t_ns| Row { line: row.line, t_ns, position_ned_m, attitude, states_attitude })
         })
         .collect();
     (rows, frame)
@@ -218,7 +224,7 @@ fn drop_spikes(rows: &mut Vec<Row>, report: &mut CleaningReport) {
 
 /// Counts missing attitudes and turns glitches into missing ones.
 fn mark_attitudes(rows: &mut [Row], report: &mut CleaningReport) {
-    for row in rows.iter().filter(|row| row.attitude.is_missing()) {
+    for row in rows.iter().filter(|row| row.states_attitude && row.attitude.is_missing()) {
         report.attitude_missing.add(row.line);
     }
     let is_glitch = outliers::find(&times_s(rows), &Attitudes(rows), GLITCH_FLOOR_RAD);
@@ -248,6 +254,7 @@ fn merge(rows: &mut Vec<Row>, report: &mut CleaningReport) {
             t_ns: group[0].t_ns.saturating_add(offset_ns as i64),
             position_ned_m: group.iter().map(|row| row.position_ned_m).sum::<DVec3>() / count as f64,
             attitude: Attitude::mean(group.iter().map(|row| row.attitude)),
+            states_attitude: group.iter().any(|row| row.states_attitude),
         });
         start = end;
     }
@@ -306,6 +313,7 @@ fn insert_turns(rows: &[Row], report: &mut CleaningReport) -> Result<Vec<Row>, L
                     t_ns: t_ns as i64,
                     position_ned_m: a.position_ned_m.lerp(b.position_ned_m, fraction),
                     attitude: a.attitude.interpolate(b.attitude, fraction),
+                    states_attitude: false,
                 });
                 report.inserted += 1;
             }

@@ -7,6 +7,15 @@ use crate::scenario::AngleKind;
 /// How many line numbers a [`Finding`] keeps.
 pub const KEPT_LINES: usize = 8;
 
+/// Something that the reader of a log has to say about the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Note {
+    /// Whether it is open to doubt; else it is plain information.
+    pub is_warning: bool,
+    /// What was found and how it was taken; without the file's name.
+    pub text: String,
+}
+
 /// One kind of fault: how often, and where it was seen first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Finding {
@@ -35,6 +44,10 @@ pub struct CleaningReport {
     pub rows_read: usize,
     /// Dropped: time or position missing, not finite or out of range.
     pub unusable: Finding,
+    /// Dropped: latitude or longitude exactly 0 far from all the others, as receivers write without a fix.
+    pub null_fixes: Finding,
+    /// Dropped: height exactly 0 far from the heights around, as receivers write before their first height.
+    pub null_heights: Finding,
     /// Earlier than a row before them: sorted.
     pub out_of_order: Finding,
     /// Attitude missing or not finite: interpolated.
@@ -68,15 +81,30 @@ impl CleaningReport {
 
     /// Gives the lines of all rows that were repaired, and keeps them no longer.
     pub(super) fn take_lines(&mut self) -> HashSet<usize> {
-        let Self { unusable, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates, gaps, .. } = self;
+        let Self {
+            unusable,
+            null_fixes,
+            null_heights,
+            out_of_order,
+            attitude_missing,
+            attitude_glitches,
+            position_spikes,
+            merged,
+            duplicates,
+            gaps,
+            ..
+        } = self;
         gaps.all = Vec::new();
-        let repaired = [unusable, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates];
+        let repaired =
+            [unusable, null_fixes, null_heights, out_of_order, attitude_missing, attitude_glitches, position_spikes, merged, duplicates];
         repaired.into_iter().flat_map(|finding| std::mem::take(&mut finding.all)).collect()
     }
 
-    fn findings(&self) -> [(&'static str, &Finding); 7] {
+    fn findings(&self) -> [(&'static str, &Finding); 9] {
         [
             ("rows without usable time or position dropped", &self.unusable),
+            ("rows without a fix (latitude or longitude 0) left out", &self.null_fixes),
+            ("rows without a height (0, far from the others) left out", &self.null_heights),
             ("rows out of order sorted", &self.out_of_order),
             ("missing attitudes interpolated", &self.attitude_missing),
             ("attitude glitches interpolated", &self.attitude_glitches),

@@ -224,3 +224,44 @@ fn hostile_rows_give_errors_not_panics() {
     let zero = RawRow { attitude: RawAttitude::Quaternion(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..straight(1)[0] };
     assert_eq!(FlightLog::from_raw(&[zero], &options), Err(LogError::NoAttitude));
 }
+
+fn geodetic_row(line: usize, t_s: f64, lat_deg: f64, lon_deg: f64, height_m: f64) -> RawRow {
+    RawRow { position: RawPosition::Geodetic(Geodetic::from_deg(lat_deg, lon_deg, height_m)), ..ned_row(line, t_s, [0.0; 3], [0.0; 3]) }
+}
+
+#[test]
+fn zeros_that_stand_for_no_fix_are_left_out_and_true_zeros_stay() {
+    let alps = |i: usize| geodetic_row(i + 1, i as f64, 47.0 + 1e-5 * i as f64, 8.0, 500.0 + i as f64);
+    let mut rows: Vec<RawRow> = (0..20).map(alps).collect();
+    for (i, lat, lon, height) in
+        [(0, 0.0, 0.0, 0.0), (1, 0.0, 0.0, 0.0), (9, 0.0, 8.0, 509.0), (12, 47.00012, 0.0, 512.0), (19, 0.0, 0.0, 0.0)]
+    {
+        rows[i] = geodetic_row(i + 1, i as f64, lat, lon, height);
+    }
+    for i in [2, 3, 15] {
+        rows[i] = geodetic_row(i + 1, i as f64, 47.0 + 1e-5 * i as f64, 8.0, 0.0);
+    }
+    let report = log(&rows).report;
+    assert_eq!((report.null_fixes.count, &report.null_fixes.lines[..]), (5, &[1, 2, 10, 13, 20][..]), "{report}");
+    assert_eq!((report.null_heights.count, &report.null_heights.lines[..]), (3, &[3, 4, 16][..]), "{report}");
+    assert!((log(&rows).frame.unwrap().origin().lat_deg() - 47.00004).abs() < 1e-12);
+
+    // Over the equator and Greenwich, and off from the sea.
+    let ghana: Vec<_> = (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.1 - 0.01 * i as f64, 0.0, 3.0 * i as f64)).collect();
+    assert!(log(&ghana).report.is_clean(), "{}", log(&ghana).report);
+    // A fix at 0, 0 throughout is a made-up place, and a log of its own.
+    let nowhere: Vec<_> = (0..21).map(|i| geodetic_row(i + 1, i as f64, 0.0, 0.0, 100.0)).collect();
+    assert!(log(&nowhere).report.is_clean());
+}
+
+#[test]
+fn attitudes_of_other_rows_are_no_repair() {
+    let mut rows = straight(40);
+    for row in rows.iter_mut().skip(1).step_by(2) {
+        row.attitude = RawAttitude::None;
+    }
+    let log = log(&rows);
+    assert!(log.report.is_clean(), "{}", log.report);
+    let truth = body_from_euler_deg([0.0, 1.0, 178.0 + 0.02 * 11.0]);
+    assert!(attitude::angle_between_rad(log.rows[11].ned_from_body, truth) < 1e-6);
+}

@@ -87,6 +87,8 @@ mod tests {
             flight: FlightSpec {
                 log: "in-memory".into(),
                 format: Default::default(),
+                time_unit: Default::default(),
+                angle_unit: Default::default(),
                 angles: Default::default(),
                 attitude: Default::default(),
                 origin: Default::default(),

@@ -284,6 +284,8 @@ mod tests {
             flight: FlightSpec {
                 log: "flight.csv".into(),
                 format: Default::default(),
+                time_unit: Default::default(),
+                angle_unit: Default::default(),
                 angles: Default::default(),
                 attitude: Default::default(),
                 origin: Default::default(),

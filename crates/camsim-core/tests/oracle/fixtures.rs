@@ -17,6 +17,8 @@ pub fn scenario() -> Scenario {
     let flight = FlightSpec {
         log: "in-memory".into(),
         format: Default::default(),
+        time_unit: Default::default(),
+        angle_unit: Default::default(),
         angles: Default::default(),
         attitude: Default::default(),
         origin: Default::default(),

@@ -47,6 +47,8 @@ fn serde_free_flight() -> camsim_core::scenario::FlightSpec {
     camsim_core::scenario::FlightSpec {
         log: "in-memory".into(),
         format: Default::default(),
+        time_unit: Default::default(),
+        angle_unit: Default::default(),
         angles: Default::default(),
         attitude: Default::default(),
         origin: Default::default(),

@@ -2,16 +2,18 @@
 
 use camsim_core::{
     flight_log::{RawAttitude, RawPosition, body_from_euler_deg},
-    scenario::{AngleKind, AttitudeSource, HeightReference, Origin},
+    scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, Origin, TimeUnit},
 };
 use glam::{DQuat, DVec3};
 
 use super::*;
 
-fn spec(format: LogFormat) -> FlightSpec {
+pub(super) fn spec(format: LogFormat) -> FlightSpec {
     FlightSpec {
         log: PathBuf::new(),
         format,
+        time_unit: TimeUnit::Auto,
+        angle_unit: AngleUnit::Auto,
         angles: AngleKind::Auto,
         attitude: AttitudeSource::Log,
         origin: Origin::First,
@@ -29,7 +31,7 @@ fn raw_bytes(content: &[u8], format: LogFormat) -> Result<Vec<RawRow>, FlightLog
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.csv");
     std::fs::write(&path, content).unwrap();
-    read_raw_rows(&path, format)
+    read_raw_rows(&path, &spec(format)).map(|log| log.rows)
 }
 
 fn ned(row: &RawRow) -> DVec3 {
@@ -133,13 +135,13 @@ fn bad_files_get_one_clear_error() {
     assert!(matches!(raw("t,lat,lon,alt\n", LogFormat::Auto), Err(FlightLogError::Empty { .. })));
     assert!(matches!(raw_bytes(b"0,1\xff,2", LogFormat::Auto), Err(FlightLogError::NotText { offset: 3, .. })));
     let error = text(raw(&LLA.replace("501", "5o1"), LogFormat::Auto));
-    assert!(error.contains("line 2, column 4: `5o1` is not a number"), "{error}");
+    assert!(error.contains("line 2, column 4 (height): `5o1` is not a number"), "{error}");
     let error = text(raw(&format!("{LLA}1.5,47.0,8.0\n"), LogFormat::Auto));
     assert!(error.contains("line 4 has 3 columns, csv-lla needs 7"), "{error}");
     let error = text(raw("0,91,8,500,0,0,0\n", LogFormat::CsvLla));
-    assert!(error.contains("line 1, column 2: 91 is no latitude"), "{error}");
+    assert!(error.contains("line 1, column 2 (latitude): 91 is no latitude"), "{error}");
     assert!(text(raw("1 0 0 5 0 1 0 6 0 0 1 7\n", LogFormat::Tum)).contains("KITTI"));
-    let missing = read_raw_rows(Path::new("/nowhere/at/all.csv"), LogFormat::Auto);
+    let missing = read_raw_rows(Path::new("/nowhere/at/all.csv"), &spec(LogFormat::Auto)).map(|log| log.rows);
     assert!(text(missing).contains("/nowhere/at/all.csv"));
 }
 
@@ -153,15 +155,34 @@ fn missing_values_are_left_to_cleaning() {
 
 #[test]
 fn times_are_exact_decimals() {
-    use text::{TimeUnit, time_ns};
-    assert_eq!(time_ns("-1.5", TimeUnit::Seconds), Some(Some(-1_500_000_000)));
-    assert_eq!(time_ns("+.25", TimeUnit::Milliseconds), Some(Some(250_000)));
-    assert_eq!(time_ns("1.0000000006", TimeUnit::Seconds), Some(Some(1_000_000_001)));
-    assert_eq!(time_ns("1.037359e-01", TimeUnit::Seconds), Some(Some(103_735_900)));
-    assert_eq!(time_ns("9223372036854775807", TimeUnit::Nanoseconds), Some(Some(i64::MAX)));
-    assert_eq!(time_ns("9223372036854775808", TimeUnit::Nanoseconds), Some(None));
-    assert_eq!(time_ns("nan", TimeUnit::Seconds), Some(None));
-    assert_eq!(time_ns("1:30", TimeUnit::Seconds), None);
+    let time_ns =
+        |field: &str, unit: &units::Unit| time::number(field, false).map(|value| value.and_then(|value| time::to_ns(value, unit.factor)));
+    let [s, ms, ns, min] = [&units::SECOND, &units::MILLISECOND, &units::NANOSECOND, &units::MINUTE];
+    assert_eq!(time_ns("-1.5", s), Some(Some(-1_500_000_000)));
+    assert_eq!(time_ns("+.25", ms), Some(Some(250_000)));
+    assert_eq!(time_ns("1.0000000006", s), Some(Some(1_000_000_001)));
+    assert_eq!(time_ns("-1.0000000006", s), Some(Some(-1_000_000_001)));
+    assert_eq!(time_ns("1.037359e-01", s), Some(Some(103_735_900)));
+    assert_eq!(time_ns("9223372036854775807", ns), Some(Some(i64::MAX)));
+    assert_eq!(time_ns("9223372036854775808", ns), Some(None));
+    assert_eq!(time_ns("99999999999999999999999999999999999999", s), Some(None));
+    assert_eq!(time_ns("0.05", min), Some(Some(3_000_000_000)));
+    assert_eq!(time_ns("nan", s), Some(None));
+    assert_eq!(time_ns("1:30", s), None);
+    assert_eq!(time::clock_ns("15:41:00.980"), Some(56_460_980_000_000));
+    assert_eq!(time::clock_ns("3:41:00.98 PM"), Some(56_460_980_000_000));
+    assert_eq!(time::clock_ns("12:00:01 am"), Some(1_000_000_000));
+    for bad in ["12:34", "24:00:00", "1:60:00", "1:2:3:4", "a:b:c", ""] {
+        assert_eq!(time::clock_ns(bad), None, "{bad}");
+    }
+    // `date -u -d 2024-02-29T23:59:59Z +%s`
+    for same in
+        ["2024-02-29T23:59:59Z", "2024-02-29 23:59:59", "2024/02/29 23:59:59.000", "2024-03-01T01:29:59+01:30", "2024-02-29T18:59:59-0500"]
+    {
+        assert_eq!(time::date_time_ns(same), Some(1_709_251_199_000_000_000), "{same}");
+    }
+    assert_eq!(time::date_ns("1970-01-01"), Some(0));
+    assert_eq!(time::date_ns("01/02/2024"), None);
 }
 
 /// The collected real flights: what each gives, and that only the faults that are there are found.

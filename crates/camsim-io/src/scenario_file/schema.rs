@@ -71,7 +71,9 @@ const HEIGHT: &[&str] = &["ellipsoid", "msl"];
 pub(super) const KEYS: &[(&str, Kind)] = &[
     ("seed", Whole),
     ("flight.log", Path),
-    ("flight.format", Word(&["auto", "csv-lla", "csv-xya", "csv-ned", "tum", "euroc"])),
+    ("flight.format", Word(&["auto", "csv-lla", "csv-xya", "csv-ned", "tum", "euroc", "gpx"])),
+    ("flight.time_unit", Word(&["auto", "s", "ms", "us", "ns", "min", "h"])),
+    ("flight.angle_unit", Word(&["auto", "deg", "rad"])),
     ("flight.angles", Word(&["auto", "wrapped", "continuous"])),
     ("flight.attitude", Word(&["log", "track"])),
     ("flight.origin", NumbersOr(3, "first")),
@@ -176,7 +178,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
 ];
 
 /// Words that the format knows and this version does not.
-pub(super) const LATER_WORDS: &[(&str, &str)] = &[("flight.format", "ulog"), ("flight.format", "gpx"), ("output.channels", "flow")];
+pub(super) const LATER_WORDS: &[(&str, &str)] = &[("flight.format", "ulog"), ("output.channels", "flow")];
 
 /// Keys without which there is nothing to run, under the table that makes them necessary.
 pub(super) const REQUIRED: &[(&str, &str)] = &[

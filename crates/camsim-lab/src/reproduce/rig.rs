@@ -110,6 +110,8 @@ pub fn scenario(camera: CameraSpec) -> Scenario {
         flight: FlightSpec {
             log: "in-memory".into(),
             format: Default::default(),
+            time_unit: Default::default(),
+            angle_unit: Default::default(),
             angles: Default::default(),
             attitude: Default::default(),
             origin: Default::default(),

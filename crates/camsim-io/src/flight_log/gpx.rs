@@ -1,0 +1,116 @@
+//! Track points of GPX files.
+//!
+//! | tag | |
+//! |---|---|
+//! | `trkpt` with `lat`, `lon`, `time`, `ele` | applied: degrees, ISO 8601, metres; all tracks and segments are one log |
+//! | `trkpt` without `time`, or without `ele` where others have one | left out, counted |
+//! | `wpt`, `rte`, `extensions` and other tags of a point | not used, named in a note |
+
+use std::{collections::BTreeSet, path::Path};
+
+use camsim_core::{
+    flight_log::{Note, RawAttitude, RawPosition, RawRow},
+    geodesy::Geodetic,
+    scenario::{FlightSpec, HeightReference, LogFormat, TimeUnit},
+};
+use roxmltree::{Document, Node};
+
+use super::{FlightLogError, RawLog, columns::format_name, sniff, time};
+
+/// Reads the rows of XML text, if it is GPX.
+pub(super) fn read(path: &Path, text: &str, spec: &FlightSpec) -> Result<RawLog, FlightLogError> {
+    let other = |(what, advice): (&'static str, &'static str)| FlightLogError::OtherFormat { path: path.to_owned(), what, advice };
+    let problem = |problem: String| FlightLogError::Values { path: path.to_owned(), problem };
+    let document = Document::parse(text).map_err(|error| problem(format!("not valid XML: {error}")))?;
+    match document.root_element().tag_name().name() {
+        "gpx" => {}
+        "kml" => return Err(other(sniff::KML)),
+        _ => return Err(other(sniff::OTHER_XML)),
+    }
+    if !matches!(spec.format, LogFormat::Auto | LogFormat::Gpx) {
+        return Err(problem(format!("flight.format is \"{}\" but the file is GPX; remove the key", format_name(spec.format))));
+    }
+    let points: Vec<Node<'_, '_>> = document.descendants().filter(|node| node.has_tag_name_of("trkpt")).collect();
+    if points.is_empty() {
+        return Err(problem("the GPX file has no track points (trkpt); waypoints and routes have no times and are not flown".to_owned()));
+    }
+    let child = |point: &Node<'_, '_>, name: &str| {
+        point.children().find(|node| node.has_tag_name_of(name)).and_then(|node| node.text()).map(|text| text.trim().to_owned())
+    };
+    for (name, advice) in [("time", "record the track with times"), ("ele", "add heights (ele)")] {
+        if points.iter().all(|point| child(point, name).is_none()) {
+            return Err(problem(format!("no track point has a `{name}`: a flight needs times and heights; {advice}")));
+        }
+    }
+    let mut rows = Vec::with_capacity(points.len());
+    for point in &points {
+        let line = document.text_pos_at(point.range().start).row as usize;
+        let not_a_number = |name: &str, text: &str| FlightLogError::Header {
+            path: path.to_owned(),
+            line,
+            problem: format!("`{text}` of {name} is not a number"),
+        };
+        let number = |name: &str, text: Option<&str>| match text.map(str::trim) {
+            None | Some("") => Ok(f64::NAN),
+            Some(text) => text.parse::<f64>().map_err(|_| not_a_number(name, text)),
+        };
+        let (latitude, longitude) = (number("lat", point.attribute("lat"))?, number("lon", point.attribute("lon"))?);
+        if latitude.abs() > 90.0 || longitude.abs() > 360.0 {
+            return Err(problem(format!("line {line}: latitude {latitude}, longitude {longitude} is no place")));
+        }
+        let height_m = number("ele", child(point, "ele").as_deref())?;
+        let t_ns = match child(point, "time") {
+            None => None,
+            Some(text) => Some(
+                time::date_time_ns(&text)
+                    .ok_or_else(|| problem(format!("line {line}: `{text}` is no time such as 2023-05-01T10:00:00Z")))?,
+            ),
+        };
+        rows.push(RawRow {
+            line,
+            t_ns: t_ns.and_then(|ns| i64::try_from(ns).ok()),
+            position: RawPosition::Geodetic(Geodetic::from_deg(latitude, longitude, height_m)),
+            attitude: RawAttitude::None,
+        });
+    }
+    Ok(RawLog { rows, notes: notes(&document, &points, spec) })
+}
+
+fn notes(document: &Document<'_>, points: &[Node<'_, '_>], spec: &FlightSpec) -> Vec<Note> {
+    let mut notes = Vec::new();
+    if spec.height == HeightReference::Ellipsoid {
+        let text = "heights of GPX are above mean sea level as a rule, flight.height says \"ellipsoid\": set flight.height = \"msl\" unless you know better";
+        notes.push(Note { is_warning: true, text: text.to_owned() });
+    }
+    if spec.time_unit != TimeUnit::Auto {
+        notes.push(Note { is_warning: true, text: "flight.time_unit is not used: the times of GPX are dates".to_owned() });
+    }
+    let used = ["ele", "time", "trkpt", "trk", "trkseg", "gpx"];
+    let in_points = points.iter().flat_map(|point| point.descendants());
+    let beside = document.root_element().children().filter(|node| node.has_tag_name_of("wpt") || node.has_tag_name_of("rte"));
+    let not_used: BTreeSet<&str> = in_points
+        .chain(beside)
+        .filter(|node| node.is_element())
+        .map(|node| node.tag_name().name())
+        .filter(|name| !used.contains(name) && *name != "extensions")
+        .collect();
+    if !not_used.is_empty() {
+        // These would have changed the picture in a log of another format.
+        const ATTITUDE: [&str; 6] = ["heading", "yaw", "roll", "pitch", "course", "geoidheight"];
+        let is_warning = not_used.iter().any(|name| ATTITUDE.contains(name));
+        let list: Vec<&str> = not_used.into_iter().collect();
+        notes.push(Note { is_warning, text: format!("tags of the GPX file that are not used: {}", list.join(", ")) });
+    }
+    notes
+}
+
+trait LocalName {
+    /// Of this name in any namespace: GPX 1.0, 1.1, or none.
+    fn has_tag_name_of(&self, name: &str) -> bool;
+}
+
+impl LocalName for Node<'_, '_> {
+    fn has_tag_name_of(&self, name: &str) -> bool {
+        self.is_element() && self.tag_name().name() == name
+    }
+}

@@ -1,0 +1,103 @@
+//! Logs as nobody should write them: each gives the right flight or is refused with words that help; none is silently another flight.
+
+#![allow(clippy::unwrap_used)]
+
+mod files;
+mod times;
+mod units;
+
+use camsim_core::scenario::{AngleKind, AngleUnit, AttitudeSource, HeightReference, LogFormat, TimeUnit};
+
+use super::{tests::spec, *};
+
+thread_local! {
+    static FAULTS: std::cell::RefCell<Vec<String>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+/// Says all faults of a test at its end, not only the first one.
+struct AllFaults;
+
+impl Drop for AllFaults {
+    fn drop(&mut self) {
+        let faults = FAULTS.take();
+        assert!(std::thread::panicking() || faults.is_empty(), "{}", faults.join("\n"));
+    }
+}
+
+fn fault(text: String) {
+    FAULTS.with_borrow_mut(|faults| faults.push(text));
+}
+
+fn read_with(content: &[u8], spec: &FlightSpec) -> Result<FlightLog, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.csv");
+    std::fs::write(&path, content).unwrap();
+    read_flight_log(&path, spec, HeightConversion::None).map_err(|error| error.to_string())
+}
+
+/// A header and 21 rows of 20 s, 200 m north, 20 m up, by a pattern: `T` seconds, `LAT`, `LON`, `N` metres north, `H` metres up.
+fn log(header: &str, pattern: &str) -> String {
+    scaled(header, pattern, 1.0)
+}
+
+/// The same with times of other units.
+fn scaled(header: &str, pattern: &str, per_second: f64) -> String {
+    let mut text = if header.is_empty() { String::new() } else { format!("{header}\n") };
+    for i in 0..21 {
+        let t = f64::from(i);
+        let row = pattern
+            .replace("LAT", &format!("{:.9}", 47.0 + t * 8.994_6e-5))
+            .replace("LON", "8.0")
+            .replace('T', &format!("{}", t * per_second))
+            .replace('N', &format!("{}", 10.0 * t))
+            .replace('H', &format!("{}", 500.0 + t));
+        text += &row;
+        text += "\n";
+    }
+    text
+}
+
+/// 20 s, 200 m north, 20 m up; warnings have this part, or there are none.
+fn assert_flies(what: &str, content: &str, spec: &FlightSpec, warning: &str) {
+    let log = match read_with(content.as_bytes(), spec) {
+        Ok(log) => log,
+        Err(error) => return fault(format!("{what}: {error}")),
+    };
+    let moved = log.rows.last().unwrap().position_ned_m - log.rows[0].position_ned_m;
+    if !((log.duration_s() - 20.0).abs() < 1e-6 && (moved.x - 200.0).abs() < 0.1 && (moved.z + 20.0).abs() < 0.1) {
+        fault(format!("{what}: {moved} in {} s", log.duration_s()));
+    }
+    let warnings: Vec<&str> = log.notes.iter().filter(|note| note.is_warning).map(|note| note.text.as_str()).collect();
+    if warnings.is_empty() != warning.is_empty() || !(warning.is_empty() || warnings.iter().any(|text| text.contains(warning))) {
+        fault(format!("{what}: {warnings:?}"));
+    }
+}
+
+fn assert_refused(what: &str, content: &[u8], spec: &FlightSpec, words: &[&str]) {
+    match read_with(content, spec) {
+        Ok(log) => fault(format!("{what}: read, {} rows, {} s, {:?}", log.rows.len(), log.duration_s(), log.notes)),
+        Err(error) => {
+            for word in words.iter().filter(|word| !error.contains(**word)) {
+                fault(format!("{what}: `{error}` lacks `{word}`"));
+            }
+        }
+    }
+}
+
+fn track() -> FlightSpec {
+    FlightSpec { attitude: AttitudeSource::Track, ..spec(LogFormat::Auto) }
+}
+
+fn auto() -> FlightSpec {
+    spec(LogFormat::Auto)
+}
+
+#[test]
+fn the_reference_is_the_code() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/LOGS.md");
+    if std::env::var_os("CAMSIM_BLESS").is_some() {
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, reference()).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), reference(), "set CAMSIM_BLESS=1 to write it");
+}

@@ -1,0 +1,282 @@
+//! The numbers of the rows, as the file states them but for named units.
+
+use std::path::Path;
+
+use super::{
+    FlightLogError,
+    columns::{AttitudeColumns, Frame, Source, format_name},
+    layout::Layout,
+    text::{self, Line, Table},
+    time::{self, Kind},
+};
+
+/// Numbers of a row; NaN where it has none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) line: usize,
+    /// Nanoseconds, or 1e-12 units of a number; `None` where there is none.
+    pub(super) time: Option<i128>,
+    /// Degrees and metres, unless a header names no unit.
+    pub(super) position: [f64; 3],
+    /// Roll, pitch, yaw and nothing, or a quaternion x, y, z, w.
+    pub(super) attitude: [f64; 4],
+}
+
+impl Row {
+    pub(super) fn has_position(&self) -> bool {
+        self.position.iter().all(|value| value.is_finite())
+    }
+
+    pub(super) fn states_attitude(&self) -> bool {
+        self.attitude[..3].iter().any(|value| !value.is_nan())
+    }
+}
+
+/// All of them.
+#[derive(Debug)]
+pub(super) struct Rows {
+    pub(super) kind: Kind,
+    /// Clock times come with dates.
+    pub(super) has_dates: bool,
+    pub(super) rows: Vec<Row>,
+}
+
+pub(super) fn read(path: &Path, table: &Table<'_>, layout: &Layout) -> Result<Rows, FlightLogError> {
+    let mut fields = Vec::new();
+    let mut kind = None;
+    for line in &table.rows {
+        table.separator.split(line.text, &mut fields);
+        kind = fields.get(layout.time.column).and_then(|field| Kind::of(field));
+        if kind.is_some() {
+            break;
+        }
+    }
+    one_vehicle(path, table, layout)?;
+    let is_clock = kind == Some(Kind::Clock);
+    let date = layout.time.date.filter(|&date| is_clock && !is_same_text(table, date));
+    let reader = Reader {
+        date,
+        path,
+        table,
+        layout,
+        kind: kind.unwrap_or(Kind::Number),
+        most: if layout.has_header { layout.names.len() } else { table.columns },
+    };
+    let rows = table.rows.iter().map(|line| reader.row(line, &mut fields)).collect::<Result<_, _>>()?;
+    Ok(Rows { kind: reader.kind, has_dates: reader.date.is_some(), rows })
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    table: &'a Table<'a>,
+    layout: &'a Layout,
+    kind: Kind,
+    /// The column of dates, where they differ or can be read.
+    date: Option<usize>,
+    most: usize,
+}
+
+/// Rows of several vehicles are no flight.
+fn one_vehicle(path: &Path, table: &Table<'_>, layout: &Layout) -> Result<(), FlightLogError> {
+    let Some(column) = layout.vehicle else { return Ok(()) };
+    let mut fields = Vec::new();
+    let mut first: Option<&str> = None;
+    for line in &table.rows {
+        table.separator.split(line.text, &mut fields);
+        let Some(name) = fields.get(column).copied().filter(|name| !text::is_missing(name)) else { continue };
+        match first {
+            Some(first) if first != name => {
+                return Err(FlightLogError::Values {
+                    path: path.to_owned(),
+                    problem: format!(
+                        "line {}: `{name}` in column {}{}, but `{first}` before: keep the rows of one vehicle, or remove the column if they are all of one",
+                        line.number,
+                        column + 1,
+                        layout.named(column)
+                    ),
+                });
+            }
+            _ => first = Some(name),
+        }
+    }
+    Ok(())
+}
+
+/// A date that never changes and cannot be read doesn't matter.
+fn is_same_text(table: &Table<'_>, column: usize) -> bool {
+    let mut fields = Vec::new();
+    let mut first = None;
+    table.rows.iter().all(|line| {
+        table.separator.split(line.text, &mut fields);
+        let field = fields.get(column).copied().unwrap_or("");
+        time::date_ns(field).is_none() && *first.get_or_insert(field) == field
+    })
+}
+
+impl<'a> Reader<'a> {
+    fn row(&self, line: &Line<'a>, fields: &mut Vec<&'a str>) -> Result<Row, FlightLogError> {
+        self.table.separator.split(line.text, fields);
+        if fields.iter().skip(self.most).any(|field| !field.is_empty()) {
+            return Err(FlightLogError::SurplusColumns {
+                path: self.path.to_owned(),
+                line: line.number,
+                found: fields.len(),
+                known: self.most,
+            });
+        }
+        let row = Fields { reader: self, line: line.number, fields };
+        let time = row.time()?;
+        let mut position = [f64::NAN; 3];
+        for (value, source) in position.iter_mut().zip(self.layout.position) {
+            *value = row.number(source)?;
+        }
+        if self.layout.frame == Frame::Geodetic {
+            row.check_place(position)?;
+        }
+        let mut attitude = [f64::NAN; 4];
+        match self.layout.attitude {
+            AttitudeColumns::None => {}
+            AttitudeColumns::Euler(sources) => {
+                for (value, source) in attitude.iter_mut().zip(sources) {
+                    *value = row.number(source)?;
+                }
+            }
+            AttitudeColumns::Quaternion(columns) => {
+                for (value, column) in attitude.iter_mut().zip(columns) {
+                    *value = row.number(Source { column, part: None, factor: None })?;
+                }
+            }
+        }
+        Ok(Row { line: line.number, time, position, attitude })
+    }
+}
+
+struct Fields<'a, 'b> {
+    reader: &'b Reader<'a>,
+    line: usize,
+    fields: &'b [&'a str],
+}
+
+impl<'a> Fields<'a, '_> {
+    fn field(&self, column: usize) -> Result<&'a str, FlightLogError> {
+        let layout = self.reader.layout;
+        self.fields.get(column).copied().ok_or_else(|| FlightLogError::MissingColumns {
+            path: self.reader.path.to_owned(),
+            line: self.line,
+            found: self.fields.len(),
+            needed: layout.columns_needed(),
+            format: format_name(layout.format),
+        })
+    }
+
+    fn not_a_number(&self, column: usize, text: &str) -> FlightLogError {
+        FlightLogError::NotANumber {
+            path: self.reader.path.to_owned(),
+            line: self.line,
+            column: column + 1,
+            name: self.reader.layout.named(column),
+            text: text.to_owned(),
+            hint: hint(text),
+        }
+    }
+
+    fn number(&self, source: Source) -> Result<f64, FlightLogError> {
+        let field = self.field(source.column)?;
+        let bad = || self.not_a_number(source.column, field);
+        let value = match source.part {
+            None => self.reader.table.number(field).ok_or_else(bad)?,
+            Some(_) if text::is_missing(field) => f64::NAN,
+            Some(part) => {
+                let parts: Vec<&str> = field.split([' ', ',', ';', '/']).filter(|part| !part.is_empty()).collect();
+                let number = |text: &str| text::number(text, false);
+                if parts.len() == 2 { number(parts[part]).ok_or_else(bad)? } else { return Err(bad()) }
+            }
+        };
+        Ok(value * source.factor.unwrap_or(1.0))
+    }
+
+    fn time(&self) -> Result<Option<i128>, FlightLogError> {
+        let columns = self.reader.layout.time;
+        let field = self.field(columns.column)?;
+        if text::is_missing(field) {
+            return Ok(None);
+        }
+        let bad = |column: usize, text: &str| self.not_a_number(column, text);
+        match self.reader.kind {
+            Kind::DateTime => time::date_time_ns(field).map(Some).ok_or_else(|| bad(columns.column, field)),
+            Kind::Clock => {
+                let clock = time::clock_ns(field).ok_or_else(|| bad(columns.column, field))?;
+                let Some(column) = self.reader.date else { return Ok(Some(clock)) };
+                let date = self.field(column)?;
+                if text::is_missing(date) {
+                    return Ok(None);
+                }
+                time::date_ns(date).map(|day| Some(day + clock)).ok_or_else(|| bad(column, date))
+            }
+            Kind::Number => {
+                let decimal_commas = self.reader.table.has_decimal_commas;
+                let whole = time::number(field, decimal_commas).ok_or_else(|| bad(columns.column, field))?;
+                let Some(column) = columns.nanoseconds else { return Ok(whole) };
+                let field = self.field(column)?;
+                let part = time::number(field, decimal_commas).ok_or_else(|| bad(column, field))?;
+                // 1e-12 s and 1e-12 ns.
+                Ok(whole.zip(part).map(|(whole, part)| whole + part / 1_000_000_000))
+            }
+        }
+    }
+
+    /// Latitude, longitude and height can be ones.
+    fn check_place(&self, [latitude, longitude, height_m]: [f64; 3]) -> Result<(), FlightLogError> {
+        let sources = self.reader.layout.position;
+        let fail = |source: Source, what: &'static str, value: f64, advice: &'static str| {
+            Err(FlightLogError::OutOfRange {
+                path: self.reader.path.to_owned(),
+                line: self.line,
+                column: source.column + 1,
+                name: self.reader.layout.named(source.column),
+                what,
+                value,
+                advice,
+            })
+        };
+        for (source, what, value, limit) in [(sources[0], "latitude", latitude, 90.0), (sources[1], "longitude", longitude, 360.0)] {
+            if value.is_finite() && value.abs() > limit {
+                let advice = if value.abs() > 1e5 && source.factor.is_none() && value.fract() == 0.0 {
+                    "are these 1e-7 degrees? Then name the columns lat_e7 and lon_e7"
+                } else {
+                    "are these metres? Then set flight.format = \"csv-xya\" or \"csv-ned\""
+                };
+                return fail(source, what, value, advice);
+            }
+        }
+        if height_m.is_finite() && !(-1000.0..=1e5).contains(&height_m) {
+            let advice = "leave the field empty where the height is missing, or name the unit in the header (alt_mm, alt_cm, alt_ft)";
+            return fail(sources[2], "height in metres", height_m, advice);
+        }
+        Ok(())
+    }
+}
+
+/// What a field that is no number looks like, and what to do.
+fn hint(text: &str) -> &'static str {
+    let digits = text.bytes().filter(u8::is_ascii_digit).count();
+    if time::clock_ns(text).is_some() || time::date_time_ns(text).is_some() {
+        "; it is a time, but other rows have numbers there"
+    } else if digits >= 6 && text.contains(['/', '-', '.']) && text.split(['/', '-', '.']).count() >= 3 {
+        "; dates are year-month-day, times 2023-05-01T10:00:00Z"
+    } else if digits > 0 && text.contains(':') {
+        "; times are numbers, hours:minutes:seconds or 2023-05-01T10:00:00Z"
+    } else if digits > 0 && text.contains(',') {
+        "; write decimals with a point, or all numbers of the file with a comma and semicolons between them"
+    } else if digits > 0 && text.ends_with(['N', 'S', 'E', 'W']) {
+        "; write signed degrees without a letter"
+    } else if digits > 0 && text.contains(['°', '\'', '"']) {
+        "; write degrees with decimals, and units in the header"
+    } else if text.contains('"') {
+        "; a quote is not closed or not at the beginning of the field"
+    } else if text.chars().all(|c| c.is_alphabetic() || c == '_') {
+        "; leave it empty where the value is missing; a second header line does not belong here"
+    } else {
+        ""
+    }
+}
