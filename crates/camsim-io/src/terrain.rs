@@ -1,11 +1,19 @@
 //! Terrain from a GeoTIFF of heights and a picture of the ground.
 
+mod bands;
+mod beside;
 mod crs;
 mod dem;
+mod geo_tags;
 mod georeference;
+mod height_files;
+mod metadata;
 mod ortho;
 pub(crate) mod raster;
 mod shade;
+mod systems;
+mod tiff_file;
+mod wkt;
 
 use std::{
     path::PathBuf,
@@ -23,7 +31,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::pictures::PictureError;
-pub(crate) use georeference::world_files;
+pub(crate) use beside::files as files_beside_raster;
 
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
 use ortho::{Ortho, OrthoPlace};
@@ -41,6 +49,8 @@ pub struct LoadedTerrain {
     pub terrain: Terrain,
     /// Where it lies.
     pub summary: TerrainSummary,
+    /// What a user should know of its files.
+    pub notes: Vec<String>,
 }
 
 /// Where a terrain lies, and what was repaired.
@@ -89,7 +99,7 @@ pub enum TerrainFileError {
     },
     /// The DEM says nothing about where it is.
     #[error(
-        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it. \
+        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it{more}. \
          Add them, for example with `gdal_translate -a_srs EPSG:CODE -a_ullr WEST NORTH EAST SOUTH IN OUT`"
     )]
     NoGeoreference {
@@ -97,6 +107,8 @@ pub enum TerrainFileError {
         path: PathBuf,
         /// Name of the world file that would do.
         world: String,
+        /// What there is in its place.
+        more: String,
     },
     /// A world file that cannot be understood.
     #[error("{path}: a world file has six numbers, one a line: {reason}")]
@@ -120,7 +132,7 @@ pub enum TerrainFileError {
     },
     /// The coordinate system is not known.
     #[error(
-        "{path}: EPSG:{epsg} is not supported. Known are 4326, 4258, 3857, 21781, 2056, 32601-32660, 32701-32760 and 25828-25838: \
+        "{path}: EPSG:{epsg} is not supported (docs/inputs/TERRAIN.md has those that are): \
          reproject with `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a wrong code"
     )]
     UnsupportedCrs {
@@ -139,14 +151,34 @@ pub enum TerrainFileError {
         /// In the scenario.
         wanted: u16,
     },
-    /// Units other than metres.
+    /// A definition without a code.
     #[error(
-        "{path}: the {what} unit has EPSG code {code}; only metres (9001) and feet (9002, 9003, heights only) are known: convert the file"
+        "{path}: defines a coordinate system of its own ({name}), without an EPSG code: give it one with `gdalwarp -t_srs EPSG:CODE IN OUT`, \
+         or, for a DEM whose system has a code, set scene.terrain.epsg"
+    )]
+    OwnCrs {
+        /// The file.
+        path: PathBuf,
+        /// What the file calls it.
+        name: String,
+    },
+    /// Something that changes the numbers and cannot be applied.
+    #[error("{path}: {problem}")]
+    Meaning {
+        /// The file.
+        path: PathBuf,
+        /// What it is and what to do.
+        problem: String,
+    },
+    /// A unit that is not known, or not that of the coordinate system.
+    #[error(
+        "{path}: the {what} unit has EPSG code {code}, which is not known, or not that of its coordinate system: convert the file with `gdalwarp -t_srs EPSG:CODE IN OUT` \
+         (for heights, scene.terrain.height_unit says it)"
     )]
     Unit {
         /// The file.
         path: PathBuf,
-        /// "horizontal" or "vertical".
+        /// "horizontal", "angular" or "vertical".
         what: &'static str,
         /// EPSG code of the unit.
         code: u16,
@@ -214,13 +246,22 @@ pub fn read_terrain_in_light(
     height_shift: Option<HeightShift<'_>>,
     light: Option<&Light>,
 ) -> Result<LoadedTerrain, TerrainFileError> {
-    let dem = Dem::read(&spec.dem, spec.epsg)?;
+    let dem = Dem::read(spec, height_shift.is_some())?;
     let heights = dem.heights();
-    let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, &dem)).transpose()?;
+    let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, spec, &dem)).transpose()?;
+    let mut notes = dem.notes.clone();
+    if heights.implausible > 0 {
+        notes.push(format!(
+            "{}: {} of its numbers are no heights in metres (-11 500 to 9500) and are taken as missing: if they are of another unit, set scene.terrain.height_unit",
+            spec.dem.display(),
+            heights.implausible
+        ));
+    }
     let mut grid = Grid { dem: &dem, ned_from_geodetic, height_shift, place: None, outside_crs: AtomicBool::new(false) };
     let texture = match ortho {
         Some(ortho) => {
             grid.place = ortho.place;
+            notes.extend(ortho.notes);
             ortho.texture
         }
         // Colours of heights have a light of their own, but for that of the scene.
@@ -238,7 +279,7 @@ pub fn read_terrain_in_light(
     }
     let picture_times = light.map_or(1, |light| terrain.light_up(light));
     let summary = TerrainSummary { picture_times, ..grid.summary(&heights, outside_ortho) };
-    Ok(LoadedTerrain { terrain, summary })
+    Ok(LoadedTerrain { terrain, summary, notes })
 }
 
 /// What a terrain is made of: points are found when they are asked for.
@@ -285,6 +326,10 @@ impl Grid<'_> {
             .fold([EMPTY_RANGE; 2], |ranges, place| [0, 1].map(|k: usize| widened(ranges[k], place[k])));
         let middle = dem.model_from_pixel.apply(dem.size.map(|n| 0.5 * f64::from(n)));
         let centre_rad = dem.crs.geodetic_from_model(middle).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
+        // 190 degrees east are 170 degrees west.
+        let turns = std::f64::consts::TAU * (centre_rad[1] / std::f64::consts::TAU).round();
+        let [west, east, centre_lon] = [west, east, centre_rad[1]].map(|lon| lon - turns);
+        let centre_rad = [centre_rad[0], centre_lon];
         let height_m = 0.5 * (heights.range_m[0] + heights.range_m[1]) + self.shift_m(centre_rad);
         TerrainSummary {
             epsg: dem.crs.epsg,
