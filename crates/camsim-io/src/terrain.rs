@@ -24,17 +24,16 @@ use std::{
 };
 
 use camsim_core::{
-    scenario::TerrainSpec,
+    scenario::{Beyond, TerrainSpec},
     scene::{Light, Terrain, TerrainError, TerrainGrid},
 };
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::pictures::PictureError;
 pub(crate) use beside::files as files_beside_raster;
 
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
-use ortho::{Ortho, OrthoPlace};
+use ortho::Ortho;
 
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
 pub type NedFromGeodetic<'a> = &'a (dyn Fn(f64, f64, f64) -> DVec3 + Sync);
@@ -72,8 +71,10 @@ pub struct TerrainSummary {
     pub height_range_m: [f64; 2],
     /// Heights that are missing or not plausible.
     pub void_heights: u64,
-    /// Heights that lie outside of the ortho-image; they get the colour of its border.
+    /// Heights for which the ortho-image has nothing: `scene.terrain.beyond` says what is seen there.
     pub outside_ortho: u64,
+    /// Texture coordinates of the ortho-image's own corners, which is larger where the ground goes on in grey.
+    pub picture_uv: [[f64; 2]; 2],
     /// How many times finer along each side the picture was made, so that it holds the light on each height; 1 without light.
     pub picture_times: u32,
 }
@@ -257,12 +258,28 @@ pub fn read_terrain_in_light(
             heights.implausible
         ));
     }
-    let mut grid = Grid { dem: &dem, ned_from_geodetic, height_shift, place: None, outside_crs: AtomicBool::new(false) };
-    let texture = match ortho {
+    let is_void = spec.beyond == Beyond::Void;
+    let grid = Grid { dem: &dem, ned_from_geodetic, height_shift, ortho: ortho.as_ref(), is_void, outside_crs: AtomicBool::new(false) };
+    let without_picture = ortho.as_ref().map_or(0, |ortho| dem.count(|at| !dem.height_m(at).is_nan() && !ortho.shows(&dem, at)));
+    if let Some(path) = spec.ortho.as_ref().filter(|_| without_picture > 0 && without_picture == dem.points() - heights.voids) {
+        return Err(TerrainFileError::NoOverlap { ortho: path.clone(), dem: dem.path.clone() });
+    }
+    let texture = match &ortho {
         Some(ortho) => {
-            grid.place = ortho.place;
-            notes.extend(ortho.notes);
-            ortho.texture
+            notes.extend(ortho.notes.iter().cloned());
+            notes.extend(spec.ortho.as_ref().filter(|_| without_picture > 0).map(|path| {
+                let share = 100.0 * without_picture as f64 / (dem.points() - heights.voids) as f64;
+                let (is, others) = match spec.beyond {
+                    Beyond::Grey => ("grey", "\"edge\" or \"void\""),
+                    Beyond::Edge => ("of the colours at its border", "\"grey\" or \"void\""),
+                    Beyond::Void => ("left out", "\"grey\" or \"edge\""),
+                };
+                format!(
+                    "{}: {share:.2} % of the terrain's area has no picture and is {is} (scene.terrain.beyond, else {others})",
+                    path.display()
+                )
+            }));
+            ortho.texture.clone()
         }
         // Colours of heights have a light of their own, but for that of the scene.
         None => shade::relief(dem.size, heights.range_m, &|at| dem.height_m(at), &|at| grid.point_ned_m(at), light.is_none()),
@@ -273,12 +290,9 @@ pub fn read_terrain_in_light(
         return Err(TerrainFileError::OutsideCrs { path: dem.path.clone(), epsg: dem.crs.epsg, count: dem.count_outside_crs() });
     }
     let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
-    let outside_ortho = count_outside(&terrain);
-    if let Some(ortho) = spec.ortho.as_ref().filter(|_| outside_ortho == dem.points()) {
-        return Err(TerrainFileError::NoOverlap { ortho: ortho.clone(), dem: dem.path.clone() });
-    }
+    terrain.beyond = ortho.as_ref().and_then(Ortho::color_beyond);
     let picture_times = light.map_or(1, |light| terrain.light_up(light));
-    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, outside_ortho) };
+    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, without_picture) };
     Ok(LoadedTerrain { terrain, summary, notes })
 }
 
@@ -287,8 +301,9 @@ struct Grid<'a> {
     dem: &'a Dem,
     ned_from_geodetic: NedFromGeodetic<'a>,
     height_shift: Option<HeightShift<'a>>,
-    /// Of the picture; without, it covers the DEM's extent.
-    place: Option<OrthoPlace>,
+    ortho: Option<&'a Ortho>,
+    /// Whether there is ground only where there is a picture.
+    is_void: bool,
     /// Whether a point was found for which the projection has no answer.
     outside_crs: AtomicBool,
 }
@@ -300,13 +315,15 @@ impl TerrainGrid for Grid<'_> {
             return DVec3::NAN;
         };
         let height_m = self.dem.height_m(at);
-        if height_m.is_nan() { DVec3::NAN } else { (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon])) }
+        let is_left_out = self.is_void && self.ortho.is_some_and(|ortho| !ortho.shows(self.dem, at));
+        if height_m.is_nan() || is_left_out { DVec3::NAN } else { (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon])) }
     }
 
     fn uv(&self, at: [u32; 2]) -> [f32; 2] {
         let centre = Dem::pixel_centre(at);
-        match &self.place {
+        match self.ortho.and_then(|ortho| ortho.place.as_ref()) {
             Some(place) => place.uv(self.dem, at),
+            // It covers the DEM's extent.
             None => [0, 1].map(|k| (centre[k] / f64::from(self.dem.size[k])) as f32),
         }
     }
@@ -341,26 +358,10 @@ impl Grid<'_> {
             height_range_m: heights.range_m,
             void_heights: heights.voids,
             outside_ortho,
+            picture_uv: self.ortho.map_or([[0.0; 2], [1.0; 2]], Ortho::own_uv),
             picture_times: 1,
         }
     }
-}
-
-/// Heights that lie outside of the picture.
-fn count_outside(terrain: &Terrain) -> u64 {
-    let [columns, rows] = terrain.chunk_grid;
-    let of_chunk = |index: usize| {
-        let chunk = &terrain.chunks[index];
-        let [i, j] = [index as u32 % columns, index as u32 / columns];
-        // The last row and column of a chunk are the next one's first.
-        let [own_columns, own_rows] = [chunk.cells[0] + u32::from(i + 1 == columns), chunk.cells[1] + u32::from(j + 1 == rows)];
-        let is_outside = |at: u32| {
-            let vertex = chunk.first_vertex + at / own_columns * (chunk.cells[0] + 1) + at % own_columns;
-            terrain.vertices[vertex as usize].uv.iter().any(|x| !(0.0..=1.0).contains(x))
-        };
-        (0..own_columns * own_rows).filter(|&at| is_outside(at)).count() as u64
-    };
-    (0..terrain.chunks.len()).into_par_iter().map(of_chunk).sum()
 }
 
 #[cfg(test)]

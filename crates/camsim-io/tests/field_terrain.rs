@@ -5,7 +5,10 @@
 
 use std::path::{Path, PathBuf};
 
-use camsim_core::scenario::{HeightReference, HeightUnit, TerrainSpec};
+use camsim_core::{
+    scenario::{Beyond, HeightReference, HeightUnit, TerrainSpec},
+    scene::TexelForm,
+};
 use camsim_io::terrain::{LoadedTerrain, TerrainFileError, read_terrain};
 use glam::DVec3;
 
@@ -178,4 +181,63 @@ fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
         assert!((0..2).all(|k| (uv[k] * 96.0 - at[k] as f32 - 0.5).abs() < 1e-3), "{uv:?} {at:?}");
     }
     assert!((loaded.summary.centre_rad[1].to_degrees() - -169.9952).abs() < 1e-9, "{}", loaded.summary.centre_rad[1].to_degrees());
+}
+
+/// The field's ground of 96 x 96 cells of 10 m, with a picture of 20 x 20 pixels of 10 m whose first one is that in column 30, row 40.
+fn small_picture(folder: &Path) -> PathBuf {
+    let path = folder.join("small.png");
+    image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([200, 10 * x as u8, 10 * y as u8])).save(&path).unwrap();
+    std::fs::write(folder.join("small.pgw"), "10 0 0 -10 500305 5199595").unwrap();
+    path
+}
+
+#[test]
+fn ground_beyond_its_picture_is_what_the_key_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = TerrainSpec { ortho: Some(small_picture(folder.path())), ..spec("ortho/dem.tif") };
+    let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
+    let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
+    for (beyond, says) in [(Beyond::Grey, "is grey"), (Beyond::Edge, "of the colours at its border"), (Beyond::Void, "left out")] {
+        let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
+        let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+        assert!(note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(says), "{note}");
+        assert_eq!(loaded.summary.outside_ortho, 96 * 96 - 400);
+        assert_heights(&loaded, |column, row| beyond == Beyond::Void && !inside(column, row));
+        // In the middle of the picture's pixel (3, 5), and far beyond it, at full size and in every smaller version.
+        let texture = &loaded.terrain.texture;
+        let at = |column: u32, row: u32| {
+            let [x, y] = [column, row].map(|n| n / 64);
+            let vertex =
+                loaded.terrain.chunks[(2 * y + x) as usize].first_vertex + (row - 64 * y) * (if x == 0 { 65 } else { 32 }) + column
+                    - 64 * x;
+            loaded.terrain.vertices[vertex as usize].uv
+        };
+        let pixel = |uv: [f32; 2], size: [u32; 2]| [0, 1].map(|k| (uv[k] * size[k] as f32).clamp(0.0, size[k] as f32 - 1.0) as u32);
+        let [x, y] = pixel(at(33, 45), texture.size_px);
+        let stored = |bytes: &[u8], [x, y]: [u32; 2], width: u32| bytes[4 * (y * width + x) as usize..][..3].to_vec();
+        assert_eq!(stored(&texture.rgba8, [x, y], texture.size_px[0]), [200, 30, 50]);
+        if beyond == Beyond::Grey {
+            assert_eq!(stored(&texture.rgba8, pixel(at(0, 0), texture.size_px), texture.size_px[0]), [118; 3]);
+            for level in texture.mips_within(TexelForm::Stored, loaded.terrain.beyond) {
+                for place in [[0, 0], [95, 3], [5, 95], [95, 95]] {
+                    assert_eq!(
+                        stored(&level.texels, pixel(at(place[0], place[1]), level.size_px), level.size_px[0]),
+                        [118; 3],
+                        "{:?}",
+                        level.size_px
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_picture_that_holds_the_ground_stays_as_it_is() {
+    let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
+    assert_eq!((loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.picture_uv), ([96, 96], None, [[0.0; 2], [1.0; 2]]));
+    // Half of it is masked.
+    assert!(loaded.notes[0].contains("50.00 % of the terrain's area has no picture and is grey"), "{:?}", loaded.notes);
+    let loaded = read(&TerrainSpec { beyond: Beyond::Void, ..with_ortho("ortho/o_mask.tif") }).unwrap();
+    assert_heights(&loaded, |column, _| column < 48);
 }

@@ -180,7 +180,12 @@ impl Dem {
     }
 
     pub fn count_outside_crs(&self) -> u64 {
-        (0..self.points() as usize).into_par_iter().filter(|&index| self.geodetic_rad(self.column_and_row(index)).is_none()).count() as u64
+        self.count(|at| self.geodetic_rad(at).is_none())
+    }
+
+    /// Samples of which something holds.
+    pub fn count(&self, holds: impl Fn([u32; 2]) -> bool + Sync) -> u64 {
+        (0..self.points() as usize).into_par_iter().filter(|&index| holds(self.column_and_row(index))).count() as u64
     }
 
     /// The outermost samples.

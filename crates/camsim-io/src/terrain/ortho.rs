@@ -23,9 +23,15 @@ pub(super) struct Ortho {
     pub texture: Texture,
     /// `None`: it covers the DEM's extent.
     pub place: Option<OrthoPlace>,
+    /// Whether there is something at its pixels, where it does not cover all of them.
+    content: Option<Vec<bool>>,
     /// What there is to say about it.
     pub notes: Vec<String>,
 }
+
+/// Pixels of grey around a picture that ends before the ground does: as many as a screen's pixel may cover before the colours at the picture's very border are
+/// drawn less exactly than to a texel.
+const MARGIN_PX: u32 = 64;
 
 /// Where a picture lies.
 pub(super) struct OrthoPlace {
@@ -36,17 +42,29 @@ pub(super) struct OrthoPlace {
     size: [f64; 2],
     /// Its middle, in its own coordinates.
     middle_x: f64,
+    /// Pixels that it was made larger on each side.
+    margin_px: f64,
 }
 
 impl OrthoPlace {
-    pub fn uv(&self, dem: &Dem, at: [u32; 2]) -> [f32; 2] {
+    /// Pixel coordinates of a height on the picture as it is stored.
+    fn pixel(&self, dem: &Dem, at: [u32; 2]) -> [f64; 2] {
         let model =
             if self.is_of_dem { Some(dem.model(at)) } else { dem.geodetic_rad(at).and_then(|place| self.crs.model_from_geodetic(place)) };
         // 190 degrees east are 170 degrees west.
         let model = model.map(|[x, y]| [x - self.crs.period().map_or(0.0, |period| period * ((x - self.middle_x) / period).round()), y]);
         // A point that the picture's projection does not reach is outside of the picture.
-        let pixel = model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model));
-        [(pixel[0] / self.size[0]) as f32, (pixel[1] / self.size[1]) as f32]
+        model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model))
+    }
+
+    fn is_inside(&self, pixel: [f64; 2]) -> bool {
+        (0..2).all(|k| (0.0..=self.size[k]).contains(&pixel[k]))
+    }
+
+    /// Texture coordinates.
+    pub fn uv(&self, dem: &Dem, at: [u32; 2]) -> [f32; 2] {
+        let pixel = self.pixel(dem, at);
+        [0, 1].map(|k: usize| ((pixel[k] + self.margin_px) / (self.size[k] + 2.0 * self.margin_px)) as f32)
     }
 }
 
@@ -60,8 +78,9 @@ impl Ortho {
                 texture = crate::pictures::oriented(texture, orientation);
             }
             notes.extend(geo.notes);
+            let content = content_of(&texture);
             finish(&mut texture, None, spec.beyond);
-            return Ok(Self { texture, place: None, notes: with_name(path, notes) });
+            return Ok(Self { texture, place: None, content, notes: with_name(path, notes) });
         };
         notes.extend(geo.notes.iter().cloned());
         if let Some(orientation) = geo.orientation {
@@ -73,12 +92,50 @@ impl Ortho {
         let crs = stated.crs(path, &geo, assumed)?;
         let pixel_from_model = model_from_pixel.inverse().ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
         let size = texture.size_px.map(f64::from);
+        let content = content_of(&texture);
         let over_voids = over_voids(&texture, dem, &model_from_pixel);
         finish(&mut texture, over_voids.as_deref(), spec.beyond);
         let middle_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
-        let place = OrthoPlace { pixel_from_model, is_of_dem: crs.epsg == dem.crs.epsg, crs, size, middle_x };
-        Ok(Self { texture, place: Some(place), notes: with_name(path, notes) })
+        let mut place = OrthoPlace { pixel_from_model, is_of_dem: crs.epsg == dem.crs.epsg, crs, size, middle_x, margin_px: 0.0 };
+        // What holds the border of the ground holds the ground.
+        if spec.beyond == Beyond::Grey && dem.border().any(|at| !place.is_inside(place.pixel(dem, at))) {
+            texture = texture.within(MARGIN_PX, [GREY, GREY, GREY, 255]);
+            place.margin_px = f64::from(MARGIN_PX);
+        }
+        Ok(Self { texture, place: Some(place), content, notes: with_name(path, notes) })
     }
+
+    /// The colour of ground beyond it, if that is one.
+    pub fn color_beyond(&self) -> Option<[u8; 4]> {
+        self.place.as_ref().filter(|place| place.margin_px > 0.0).map(|_| [GREY, GREY, GREY, 255])
+    }
+
+    /// Texture coordinates of its own corners.
+    pub fn own_uv(&self) -> [[f64; 2]; 2] {
+        let Some(OrthoPlace { size, margin_px, .. }) = &self.place else { return [[0.0; 2], [1.0; 2]] };
+        let share = size.map(|side| margin_px / (side + 2.0 * margin_px));
+        [share, share.map(|share| 1.0 - share)]
+    }
+
+    /// Whether it shows something at a height.
+    pub fn shows(&self, dem: &Dem, at: [u32; 2]) -> bool {
+        let pixel = match &self.place {
+            Some(place) => place.pixel(dem, at),
+            None => [0, 1].map(|k: usize| (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])),
+        };
+        if self.place.as_ref().is_some_and(|place| !place.is_inside(pixel)) {
+            return false;
+        }
+        let Some(content) = &self.content else { return true };
+        let size = self.place.as_ref().map_or(self.texture.size_px.map(f64::from), |place| place.size);
+        let [x, y] = [0, 1].map(|k: usize| pixel[k].min(size[k] - 1.0) as usize);
+        content[y * size[0] as usize + x]
+    }
+}
+
+fn content_of(texture: &Texture) -> Option<Vec<bool>> {
+    let content: Vec<bool> = texture.rgba8.chunks_exact(4).map(|pixel| pixel[3] > 0).collect();
+    content.contains(&false).then_some(content)
 }
 
 fn with_name(path: &Path, notes: Vec<String>) -> Vec<String> {

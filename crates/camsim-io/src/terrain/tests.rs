@@ -183,7 +183,8 @@ fn an_ortho_lies_where_its_georeference_says() {
     assert_eq!((loaded.terrain.vertices[0].uv, loaded.summary.outside_ortho), ([0.125, 1.0 / 6.0], 0));
     // 5 m pixels that begin 10 m further west and north.
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 499992.5 5000007.5").unwrap();
-    let loaded = read_terrain(&spec(&dem, Some(&ortho)), &ned, None).unwrap();
+    let as_its_edge = TerrainSpec { beyond: Beyond::Edge, ..spec(&dem, Some(&ortho)) };
+    let loaded = read_terrain(&as_its_edge, &ned, None).unwrap();
     assert_eq!(loaded.terrain.vertices[0].uv, [15.0 / 40.0, 0.5]);
     assert_eq!(loaded.summary.outside_ortho, 6);
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 599992.5 5000007.5").unwrap();
