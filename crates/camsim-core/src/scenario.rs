@@ -18,7 +18,8 @@ pub use camera::{
     ZoomSpec,
 };
 pub use scene::{
-    BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, LightSpec, PatternCentre, PatternSpec, SceneSpec, TerrainSpec,
+    Beyond, BoardKind, BoardSpec, Dictionary, GltfSpec, HeightReference, HeightUnit, LightSpec, PatternCentre, PatternSpec, SceneSpec,
+    TerrainSpec,
 };
 pub use validate::{
     MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX, Problem, validate, validate_camera,

@@ -47,7 +47,7 @@ impl TilePool {
     #[must_use]
     pub fn new(terrain: &Terrain, form: TexelForm) -> Self {
         let ground = Arc::new(GroundTiles::new(terrain));
-        let source = TileSource::new(&terrain.texture, form);
+        let source = TileSource::new(&terrain.texture, form, terrain.beyond);
         let place_of = vec![None; source.grid.count as usize];
         Self { ground, source, layers: None, place_of, at_place: Vec::new(), frames: 0, changes: [0; 2], table: Vec::new() }
     }

@@ -136,13 +136,13 @@ impl SceneBuffers {
     /// Uploads the scene's pictures, unless they are there: as long as the host draws all ideal frames the device needs none. What several share is uploaded once.
     pub fn bring_pictures(&mut self, gpu: &GpuContext, scene: &Scene) {
         if let (Some(terrain), Some(TerrainBuffers { picture: GroundPicture::Whole(picture) })) = (&scene.terrain, &mut self.terrain) {
-            picture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture));
+            picture.get_or_insert_with(|| upload_texture(gpu, &terrain.texture, terrain.beyond));
         }
         if self.pictures.len() < self.batches.len() {
             let mut known: HashMap<*const Texture, wgpu::TextureView> = HashMap::new();
             let picture = |batch: &MeshBatch| {
                 let texture = &batch.look.texture;
-                known.entry(Arc::as_ptr(texture)).or_insert_with(|| upload_texture(gpu, texture)).clone()
+                known.entry(Arc::as_ptr(texture)).or_insert_with(|| upload_texture(gpu, texture, None)).clone()
             };
             self.pictures = self.batches.iter().map(picture).collect();
         }
@@ -280,14 +280,15 @@ fn check_picture(gpu: &GpuContext, texture: &Texture, what: &str) -> Result<(), 
     })
 }
 
-fn upload_texture(gpu: &GpuContext, texture: &Texture) -> wgpu::TextureView {
+/// With a border around the smaller versions if there is one.
+fn upload_texture(gpu: &GpuContext, texture: &Texture, border: Option<[u8; 4]>) -> wgpu::TextureView {
     let [width, height] = texture.size_px;
     let form = match (texture.encoding, texture.size_px) {
         // Every device has the exact light of these bytes, and there are no smaller versions: a half would only round.
         (Encoding::Linear, [1, 1]) => TexelForm::Stored,
         _ => TexelForm::Light,
     };
-    let mips = texture.mips(form);
+    let mips = texture.mips_within(form, border);
     let mut data = texture.texels(&texture.rgba8, form).into_owned();
     mips.iter().for_each(|mip| data.extend_from_slice(&mip.texels));
     let on_device = gpu.device.create_texture_with_data(

@@ -11,7 +11,7 @@ use std::{
 use camsim_core::scenario::Scenario;
 use rayon::prelude::*;
 
-use crate::{gltf_file::files_beside, terrain::world_files};
+use crate::{gltf_file::files_beside, terrain::files_beside_raster};
 
 /// What is in files, by their paths.
 pub type Inputs = BTreeMap<String, String>;
@@ -19,7 +19,7 @@ pub type Inputs = BTreeMap<String, String>;
 /// Bytes that are read at once.
 const AT_ONCE: usize = 1 << 20;
 
-/// Of all files that a scenario names, and of those that these name: a model's buffers and pictures, a picture's world file. Camera files are part of the scenario itself.
+/// Of all files that a scenario names, and of those that these name: a model's buffers and pictures, what lies beside rasters. Camera files are part of the scenario itself.
 #[must_use]
 pub fn of_scenario(scenario: &Scenario) -> Inputs {
     let scene = &scenario.scene;
@@ -28,7 +28,7 @@ pub fn of_scenario(scenario: &Scenario) -> Inputs {
     paths.extend(scenario.camera.zoom_track.clone());
     for picture in scene.terrain.iter().flat_map(|terrain| terrain.ortho.iter().chain([&terrain.dem])) {
         paths.push(picture.clone());
-        paths.extend(world_files(picture));
+        paths.extend(files_beside_raster(picture));
     }
     paths.extend(scene.pattern.iter().map(|pattern| pattern.image.clone()));
     paths.extend(scene.board.iter().filter_map(|board| board.target.clone()));

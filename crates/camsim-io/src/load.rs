@@ -21,6 +21,7 @@ use crate::{
     terrain::{TerrainFileError, TerrainSummary},
 };
 
+mod beyond;
 mod optics;
 mod placements;
 mod scene;
@@ -314,6 +315,7 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
             sequence.frames
         ));
     }
+    warnings.extend(terrain.and_then(|summary| beyond::beyond_picture_warning(sequence, summary)));
     if let (Some(terrain), Some(summary)) = (&sequence.scene.terrain, terrain) {
         let step = (sequence.frames / 200).max(1);
         let places =

@@ -1,4 +1,6 @@
-//! Pictures: textures and grey maps out of PNG, JPEG, GIF (first frame), BMP and TIFF files. The format is told by content, not by name.
+//! Pictures: textures and grey maps out of PNG, JPEG, WebP, GIF (first frame), BMP and TIFF files. The format is told by content, not by name.
+//!
+//! A picture that states an orientation (EXIF, or tag 274 of a TIFF) is turned as it says.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +8,7 @@ use camsim_core::{
     scene::{Encoding, Texture},
     sequence::GrayImage,
 };
-use image::{DynamicImage, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageReader, metadata::Orientation};
 
 use crate::terrain::raster::{Raster, is_tiff, most_decoded};
 
@@ -55,11 +57,34 @@ impl PictureError {
 ///
 /// [`PictureError`] names the file.
 pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureError> {
-    if is_tiff(path)? {
-        return Raster::read(path)?.to_texture(path, encoding);
-    }
-    let picture = decode(path)?.into_rgba8();
-    Ok(Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding })
+    let (texture, orientation) = if is_tiff(path)? {
+        let raster = Raster::read(path)?;
+        (raster.to_texture(path, encoding)?, raster.geo.orientation)
+    } else {
+        read_stored(path, encoding)?
+    };
+    Ok(match orientation {
+        Some(orientation) => oriented(texture, orientation),
+        None => texture,
+    })
+}
+
+/// The rows of a picture that is no TIFF as they are stored, with the number of its orientation if it is another than theirs.
+pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<(Texture, Option<u64>), PictureError> {
+    let (picture, orientation) = decode(path)?;
+    let picture = picture.into_rgba8();
+    let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
+    Ok((Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding }, number))
+}
+
+/// A picture turned as its orientation (1 to 8, EXIF) says.
+pub(crate) fn oriented(texture: Texture, orientation: u64) -> Texture {
+    let turn = u8::try_from(orientation).ok().and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms);
+    let Texture { size_px: [width, height], rgba8, encoding } = texture;
+    let Some(picture) = image::RgbaImage::from_raw(width, height, rgba8) else { return Texture::uniform([0; 4], encoding) };
+    let mut picture = DynamicImage::ImageRgba8(picture);
+    picture.apply_orientation(turn);
+    Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_rgba8().into_raw(), encoding }
 }
 
 /// Reads a picture as stored grey values 0..=1 (a vignette map, say): no transfer curve is undone. Colours become Rec. 709 luma.
@@ -79,9 +104,13 @@ pub fn read_gray_image(path: &Path) -> Result<GrayImage, PictureError> {
                 format!("grey values of floats are 0 to 1, and the largest is {most}: divide them by what white is"),
             ));
         }
-        return raster.to_gray(path);
+        return match raster.geo.orientation {
+            Some(orientation) => Ok(gray_from_texture(&oriented(raster.to_texture(path, Encoding::Linear)?, orientation))),
+            None => raster.to_gray(path),
+        };
     }
-    let picture = decode(path)?;
+    let (mut picture, orientation) = decode(path)?;
+    picture.apply_orientation(orientation);
     if picture.color().has_alpha() && picture.to_rgba8().pixels().any(|pixel| pixel.0[3] < u8::MAX) {
         return Err(PictureError::decode(path, "grey values are wanted, and parts of it are transparent: flatten it onto black or white"));
     }
@@ -129,22 +158,28 @@ pub(crate) fn decode_bytes(bytes: &[u8]) -> Result<DynamicImage, String> {
     if picture.width() == 0 || picture.height() == 0 { Err("the picture has no pixel".into()) } else { Ok(picture) }
 }
 
-fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
+/// The rows as they are stored, and how they are to be turned.
+fn decode(path: &Path) -> Result<(DynamicImage, Orientation), PictureError> {
     let bytes = std::fs::metadata(path).map_err(|source| PictureError::open(path, source))?.len();
     let mut reader =
         ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(|source| PictureError::open(path, source))?;
     if reader.format().is_none() {
-        return Err(PictureError::decode(path, "not a PNG, JPEG, GIF, BMP or TIFF file"));
+        return Err(PictureError::decode(path, "not a PNG, JPEG, WebP, GIF, BMP or TIFF file"));
     }
+    let wrong = |error: image::ImageError| PictureError::decode(path, error.to_string());
     // By itself it would stop at 512 MiB, however large the file.
     let mut limits = image::Limits::default();
     limits.max_alloc = limits.max_alloc.map(|least| least.max(most_decoded(bytes)));
-    reader.limits(limits);
-    let picture = reader.decode().map_err(|error| PictureError::decode(path, error.to_string()))?;
+    reader.limits(limits.clone());
+    let mut decoder = reader.into_decoder().map_err(wrong)?;
+    let orientation = decoder.orientation().map_err(wrong)?;
+    limits.reserve(decoder.total_bytes()).map_err(wrong)?;
+    decoder.set_limits(limits).map_err(wrong)?;
+    let picture = DynamicImage::from_decoder(decoder).map_err(wrong)?;
     if picture.width() == 0 || picture.height() == 0 {
         return Err(PictureError::decode(path, "the picture has no pixel"));
     }
-    Ok(picture)
+    Ok((picture, orientation))
 }
 
 #[cfg(test)]

@@ -1,11 +1,19 @@
 //! Terrain from a GeoTIFF of heights and a picture of the ground.
 
+mod bands;
+mod beside;
 mod crs;
 mod dem;
+mod geo_tags;
 mod georeference;
+mod height_files;
+mod metadata;
 mod ortho;
 pub(crate) mod raster;
 mod shade;
+mod systems;
+mod tiff_file;
+mod wkt;
 
 use std::{
     path::PathBuf,
@@ -16,17 +24,16 @@ use std::{
 };
 
 use camsim_core::{
-    scenario::TerrainSpec,
+    scenario::{Beyond, TerrainSpec},
     scene::{Light, Terrain, TerrainError, TerrainGrid},
 };
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::pictures::PictureError;
-pub(crate) use georeference::world_files;
+pub(crate) use beside::files as files_beside_raster;
 
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
-use ortho::{Ortho, OrthoPlace};
+use ortho::Ortho;
 
 /// NED position (metres) of latitude, longitude (radians) and ellipsoidal height (metres).
 pub type NedFromGeodetic<'a> = &'a (dyn Fn(f64, f64, f64) -> DVec3 + Sync);
@@ -41,6 +48,8 @@ pub struct LoadedTerrain {
     pub terrain: Terrain,
     /// Where it lies.
     pub summary: TerrainSummary,
+    /// What a user should know of its files.
+    pub notes: Vec<String>,
 }
 
 /// Where a terrain lies, and what was repaired.
@@ -62,8 +71,10 @@ pub struct TerrainSummary {
     pub height_range_m: [f64; 2],
     /// Heights that are missing or not plausible.
     pub void_heights: u64,
-    /// Heights that lie outside of the ortho-image; they get the colour of its border.
+    /// Heights for which the ortho-image has nothing: `scene.terrain.beyond` says what is seen there.
     pub outside_ortho: u64,
+    /// Texture coordinates of the ortho-image's own corners, which is larger where the ground goes on in grey.
+    pub picture_uv: [[f64; 2]; 2],
     /// How many times finer along each side the picture was made, so that it holds the light on each height; 1 without light.
     pub picture_times: u32,
 }
@@ -89,7 +100,7 @@ pub enum TerrainFileError {
     },
     /// The DEM says nothing about where it is.
     #[error(
-        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it. \
+        "{path}: no georeference: neither GeoTIFF tags nor a world file ({world}) beside it{more}. \
          Add them, for example with `gdal_translate -a_srs EPSG:CODE -a_ullr WEST NORTH EAST SOUTH IN OUT`"
     )]
     NoGeoreference {
@@ -97,6 +108,8 @@ pub enum TerrainFileError {
         path: PathBuf,
         /// Name of the world file that would do.
         world: String,
+        /// What there is in its place.
+        more: String,
     },
     /// A world file that cannot be understood.
     #[error("{path}: a world file has six numbers, one a line: {reason}")]
@@ -120,7 +133,7 @@ pub enum TerrainFileError {
     },
     /// The coordinate system is not known.
     #[error(
-        "{path}: EPSG:{epsg} is not supported. Known are 4326, 4258, 3857, 21781, 2056, 32601-32660, 32701-32760 and 25828-25838: \
+        "{path}: EPSG:{epsg} is not supported (docs/inputs/TERRAIN.md has those that are): \
          reproject with `gdalwarp -t_srs EPSG:CODE IN OUT`, or set scene.terrain.epsg if the file states a wrong code"
     )]
     UnsupportedCrs {
@@ -139,14 +152,34 @@ pub enum TerrainFileError {
         /// In the scenario.
         wanted: u16,
     },
-    /// Units other than metres.
+    /// A definition without a code.
     #[error(
-        "{path}: the {what} unit has EPSG code {code}; only metres (9001) and feet (9002, 9003, heights only) are known: convert the file"
+        "{path}: defines a coordinate system of its own ({name}), without an EPSG code: give it one with `gdalwarp -t_srs EPSG:CODE IN OUT`, \
+         or, for a DEM whose system has a code, set scene.terrain.epsg"
+    )]
+    OwnCrs {
+        /// The file.
+        path: PathBuf,
+        /// What the file calls it.
+        name: String,
+    },
+    /// Something that changes the numbers and cannot be applied.
+    #[error("{path}: {problem}")]
+    Meaning {
+        /// The file.
+        path: PathBuf,
+        /// What it is and what to do.
+        problem: String,
+    },
+    /// A unit that is not known, or not that of the coordinate system.
+    #[error(
+        "{path}: the {what} unit has EPSG code {code}, which is not known, or not that of its coordinate system: convert the file with `gdalwarp -t_srs EPSG:CODE IN OUT` \
+         (for heights, scene.terrain.height_unit says it)"
     )]
     Unit {
         /// The file.
         path: PathBuf,
-        /// "horizontal" or "vertical".
+        /// "horizontal", "angular" or "vertical".
         what: &'static str,
         /// EPSG code of the unit.
         code: u16,
@@ -214,14 +247,39 @@ pub fn read_terrain_in_light(
     height_shift: Option<HeightShift<'_>>,
     light: Option<&Light>,
 ) -> Result<LoadedTerrain, TerrainFileError> {
-    let dem = Dem::read(&spec.dem, spec.epsg)?;
+    let dem = Dem::read(spec, height_shift.is_some())?;
     let heights = dem.heights();
-    let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, &dem)).transpose()?;
-    let mut grid = Grid { dem: &dem, ned_from_geodetic, height_shift, place: None, outside_crs: AtomicBool::new(false) };
-    let texture = match ortho {
+    let ortho = spec.ortho.as_deref().map(|path| Ortho::read(path, spec, &dem)).transpose()?;
+    let mut notes = dem.notes.clone();
+    if heights.implausible > 0 {
+        notes.push(format!(
+            "{}: {} of its numbers are no heights in metres (-11 500 to 9500) and are taken as missing: if they are of another unit, set scene.terrain.height_unit",
+            spec.dem.display(),
+            heights.implausible
+        ));
+    }
+    let is_void = spec.beyond == Beyond::Void;
+    let grid = Grid { dem: &dem, ned_from_geodetic, height_shift, ortho: ortho.as_ref(), is_void, outside_crs: AtomicBool::new(false) };
+    let without_picture = ortho.as_ref().map_or(0, |ortho| dem.count(|at| !dem.height_m(at).is_nan() && !ortho.shows(&dem, at)));
+    if let Some(path) = spec.ortho.as_ref().filter(|_| without_picture > 0 && without_picture == dem.points() - heights.voids) {
+        return Err(TerrainFileError::NoOverlap { ortho: path.clone(), dem: dem.path.clone() });
+    }
+    let texture = match &ortho {
         Some(ortho) => {
-            grid.place = ortho.place;
-            ortho.texture
+            notes.extend(ortho.notes.iter().cloned());
+            notes.extend(spec.ortho.as_ref().filter(|_| without_picture > 0).map(|path| {
+                let share = 100.0 * without_picture as f64 / (dem.points() - heights.voids) as f64;
+                let (is, others) = match spec.beyond {
+                    Beyond::Grey => ("grey", "\"edge\" or \"void\""),
+                    Beyond::Edge => ("of the colours at its border", "\"grey\" or \"void\""),
+                    Beyond::Void => ("left out", "\"grey\" or \"edge\""),
+                };
+                format!(
+                    "{}: {share:.2} % of the terrain's area has no picture and is {is} (scene.terrain.beyond, else {others})",
+                    path.display()
+                )
+            }));
+            ortho.texture.clone()
         }
         // Colours of heights have a light of their own, but for that of the scene.
         None => shade::relief(dem.size, heights.range_m, &|at| dem.height_m(at), &|at| grid.point_ned_m(at), light.is_none()),
@@ -232,13 +290,10 @@ pub fn read_terrain_in_light(
         return Err(TerrainFileError::OutsideCrs { path: dem.path.clone(), epsg: dem.crs.epsg, count: dem.count_outside_crs() });
     }
     let mut terrain = made.map_err(|source| TerrainFileError::Grid { path: spec.dem.clone(), source })?;
-    let outside_ortho = count_outside(&terrain);
-    if let Some(ortho) = spec.ortho.as_ref().filter(|_| outside_ortho == dem.points()) {
-        return Err(TerrainFileError::NoOverlap { ortho: ortho.clone(), dem: dem.path.clone() });
-    }
+    terrain.beyond = ortho.as_ref().and_then(Ortho::color_beyond);
     let picture_times = light.map_or(1, |light| terrain.light_up(light));
-    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, outside_ortho) };
-    Ok(LoadedTerrain { terrain, summary })
+    let summary = TerrainSummary { picture_times, ..grid.summary(&heights, without_picture) };
+    Ok(LoadedTerrain { terrain, summary, notes })
 }
 
 /// What a terrain is made of: points are found when they are asked for.
@@ -246,8 +301,9 @@ struct Grid<'a> {
     dem: &'a Dem,
     ned_from_geodetic: NedFromGeodetic<'a>,
     height_shift: Option<HeightShift<'a>>,
-    /// Of the picture; without, it covers the DEM's extent.
-    place: Option<OrthoPlace>,
+    ortho: Option<&'a Ortho>,
+    /// Whether there is ground only where there is a picture.
+    is_void: bool,
     /// Whether a point was found for which the projection has no answer.
     outside_crs: AtomicBool,
 }
@@ -259,13 +315,15 @@ impl TerrainGrid for Grid<'_> {
             return DVec3::NAN;
         };
         let height_m = self.dem.height_m(at);
-        if height_m.is_nan() { DVec3::NAN } else { (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon])) }
+        let is_left_out = self.is_void && self.ortho.is_some_and(|ortho| !ortho.shows(self.dem, at));
+        if height_m.is_nan() || is_left_out { DVec3::NAN } else { (self.ned_from_geodetic)(lat, lon, height_m + self.shift_m([lat, lon])) }
     }
 
     fn uv(&self, at: [u32; 2]) -> [f32; 2] {
         let centre = Dem::pixel_centre(at);
-        match &self.place {
+        match self.ortho.and_then(|ortho| ortho.place.as_ref()) {
             Some(place) => place.uv(self.dem, at),
+            // It covers the DEM's extent.
             None => [0, 1].map(|k| (centre[k] / f64::from(self.dem.size[k])) as f32),
         }
     }
@@ -285,6 +343,10 @@ impl Grid<'_> {
             .fold([EMPTY_RANGE; 2], |ranges, place| [0, 1].map(|k: usize| widened(ranges[k], place[k])));
         let middle = dem.model_from_pixel.apply(dem.size.map(|n| 0.5 * f64::from(n)));
         let centre_rad = dem.crs.geodetic_from_model(middle).unwrap_or([0.5 * (south + north), 0.5 * (west + east)]);
+        // 190 degrees east are 170 degrees west.
+        let turns = std::f64::consts::TAU * (centre_rad[1] / std::f64::consts::TAU).round();
+        let [west, east, centre_lon] = [west, east, centre_rad[1]].map(|lon| lon - turns);
+        let centre_rad = [centre_rad[0], centre_lon];
         let height_m = 0.5 * (heights.range_m[0] + heights.range_m[1]) + self.shift_m(centre_rad);
         TerrainSummary {
             epsg: dem.crs.epsg,
@@ -296,26 +358,10 @@ impl Grid<'_> {
             height_range_m: heights.range_m,
             void_heights: heights.voids,
             outside_ortho,
+            picture_uv: self.ortho.map_or([[0.0; 2], [1.0; 2]], Ortho::own_uv),
             picture_times: 1,
         }
     }
-}
-
-/// Heights that lie outside of the picture.
-fn count_outside(terrain: &Terrain) -> u64 {
-    let [columns, rows] = terrain.chunk_grid;
-    let of_chunk = |index: usize| {
-        let chunk = &terrain.chunks[index];
-        let [i, j] = [index as u32 % columns, index as u32 / columns];
-        // The last row and column of a chunk are the next one's first.
-        let [own_columns, own_rows] = [chunk.cells[0] + u32::from(i + 1 == columns), chunk.cells[1] + u32::from(j + 1 == rows)];
-        let is_outside = |at: u32| {
-            let vertex = chunk.first_vertex + at / own_columns * (chunk.cells[0] + 1) + at % own_columns;
-            terrain.vertices[vertex as usize].uv.iter().any(|x| !(0.0..=1.0).contains(x))
-        };
-        (0..own_columns * own_rows).filter(|&at| is_outside(at)).count() as u64
-    };
-    (0..terrain.chunks.len()).into_par_iter().map(of_chunk).sum()
 }
 
 #[cfg(test)]

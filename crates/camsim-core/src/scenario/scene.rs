@@ -52,12 +52,12 @@ impl Default for LightSpec {
 }
 
 /// `scene.terrain`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainSpec {
-    /// GeoTIFF of heights.
+    /// GeoTIFF, ESRI ASCII grid or SRTM tile of heights.
     pub dem: PathBuf,
-    /// GeoTIFF, PNG or JPEG of colour; without georeference it covers the DEM's extent.
+    /// GeoTIFF, PNG, JPEG or WebP of colour; without georeference it covers the DEM's extent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ortho: Option<PathBuf>,
     /// Vertical reference of the DEM.
@@ -66,6 +66,56 @@ pub struct TerrainSpec {
     /// EPSG code, when the DEM does not state one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub epsg: Option<u16>,
+    /// Unit of the heights, when the DEM does not state one, or two.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_unit: Option<HeightUnit>,
+    /// The stored number of the ortho-image that is white; the largest that its bits can hold if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ortho_white: Option<f64>,
+    /// What is seen where the ortho-image has nothing.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub beyond: Beyond,
+}
+
+/// Of heights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeightUnit {
+    /// Metres.
+    M,
+    /// International feet.
+    Ft,
+    /// US survey feet.
+    UsFt,
+}
+
+impl HeightUnit {
+    /// Metres in one.
+    #[must_use]
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Ft => 0.3048,
+            Self::UsFt => 1200.0 / 3937.0,
+        }
+    }
+}
+
+/// Ground without a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Beyond {
+    /// A neutral grey.
+    #[default]
+    Grey,
+    /// The colours of the picture's border, as far as there is ground.
+    Edge,
+    /// No ground.
+    Void,
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// `scene.pattern`: level at the origin's height, image top to the north.

@@ -129,10 +129,10 @@ pub struct TileSource {
 }
 
 impl TileSource {
-    /// Computes the smaller versions.
+    /// Computes the smaller versions, within a border of a colour if there is one.
     #[must_use]
-    pub fn new(texture: &Arc<Texture>, form: TexelForm) -> Self {
-        Self { grid: TileGrid::new(texture.size_px), texture: texture.clone(), form, mips: texture.mips(form) }
+    pub fn new(texture: &Arc<Texture>, form: TexelForm, border: Option<[u8; 4]>) -> Self {
+        Self { grid: TileGrid::new(texture.size_px), texture: texture.clone(), form, mips: texture.mips_within(form, border) }
     }
 
     /// What [`TileSource::texels`] are.
@@ -202,7 +202,7 @@ mod tests {
 
     fn expect_every_version(form: TexelForm) {
         let texture = picture([700, 259]);
-        let source = TileSource::new(&texture, form);
+        let source = TileSource::new(&texture, form, None);
         let whole = texture.texels(&texture.rgba8, form);
         let bytes = form.bytes();
         let versions: Vec<_> =

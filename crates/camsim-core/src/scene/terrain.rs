@@ -93,6 +93,8 @@ pub struct Terrain {
     pub void_cells: u64,
     /// The picture on the ground.
     pub texture: Arc<Texture>,
+    /// Colour of the ground beyond the picture (R G B A as stored): its outermost texels have it at every level. None: they stay as they are.
+    pub beyond: Option<[u8; 4]>,
     /// Vertices lie on multiples of this, metres (a power of two).
     pub quantum_m: f64,
     /// Box around everything.

@@ -173,6 +173,13 @@ impl Texture {
     /// Area-weighted box filter in linear light: a target pixel averages exactly the source rectangle that it covers, so odd sizes keep
     /// the picture in place. Colour is weighted by alpha: pixels without content do not darken their neighbours.
     pub fn mips(&self, form: TexelForm) -> Vec<MipLevel> {
+        self.mips_within(form, None)
+    }
+
+    /// As [`Texture::mips`], with a border of one colour (R G B A as stored) around each level, in place of its outermost texels: what a clamped
+    /// picture shows beyond is then the same at every level, if its own outermost texels are of that colour.
+    pub fn mips_within(&self, form: TexelForm, border: Option<[u8; 4]>) -> Vec<MipLevel> {
+        let border = border.map(|color| self.texels(&color, form).into_owned());
         let mut levels = Vec::new();
         if self.size_px == [1, 1] {
             return levels;
@@ -181,10 +188,19 @@ impl Texture {
         // The picture itself never stands there in floats: of a large one they would take four times its memory.
         let mut image = LinearImage::half_of(self.size_px.map(|n| n as usize), |at| linear(&table, &self.rgba8[4 * at..4 * at + 4]));
         loop {
-            let texels = match form {
+            let mut texels = match form {
                 TexelForm::Stored => image.encode(self.encoding),
                 TexelForm::Light => image.halves(),
             };
+            if let Some(border) = &border {
+                let [width, height] = image.size_px;
+                for (index, texel) in texels.chunks_exact_mut(form.bytes()).enumerate() {
+                    let [x, y] = [index % width, index / width];
+                    if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+                        texel.copy_from_slice(border);
+                    }
+                }
+            }
             levels.push(MipLevel { size_px: image.size_px.map(|n| n as u32), texels });
             if image.size_px == [1, 1] {
                 return levels;
@@ -207,6 +223,30 @@ impl Texture {
             }
         });
         Cow::Owned(halves)
+    }
+
+    /// Gives its outermost pixels a colour.
+    pub fn frame(&mut self, color: [u8; 4]) {
+        let [width, height] = self.size_px.map(|side| side as usize);
+        for (index, pixel) in self.rgba8.chunks_exact_mut(4).enumerate() {
+            let [x, y] = [index % width, index / width];
+            if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+                pixel.copy_from_slice(&color);
+            }
+        }
+    }
+
+    /// A larger picture, with so many pixels of a colour on each side.
+    #[must_use]
+    pub fn within(&self, margin_px: u32, color: [u8; 4]) -> Self {
+        let size_px = self.size_px.map(|side| side + 2 * margin_px);
+        let mut rgba8 = color.repeat(size_px[0] as usize * size_px[1] as usize);
+        let (row_bytes, margin) = (4 * self.size_px[0] as usize, margin_px as usize);
+        for (row, from) in self.rgba8.chunks_exact(row_bytes).enumerate() {
+            let to = 4 * ((row + margin) * size_px[0] as usize + margin);
+            rgba8[to..to + row_bytes].copy_from_slice(from);
+        }
+        Self { size_px, rgba8, encoding: self.encoding }
     }
 
     /// Linear R G B A of a pixel, not premultiplied.
@@ -368,6 +408,36 @@ mod tests {
                 assert!(weights.iter().enumerate().all(|(i, w)| *w == 0.0 || first + i < size));
             }
         }
+    }
+
+    #[test]
+    fn a_border_is_of_its_colour_at_every_level() {
+        let texture = Texture { size_px: [12, 9], rgba8: [200, 100, 50, 255].repeat(108), encoding: Encoding::Srgb };
+        let grey = [118, 118, 118, 255];
+        let plain = texture.mips(TexelForm::Stored);
+        for (level, plain) in texture.mips_within(TexelForm::Stored, Some(grey)).iter().zip(&plain) {
+            let [width, height] = level.size_px;
+            for y in 0..height {
+                for x in 0..width {
+                    let at = 4 * (y * width + x) as usize;
+                    let is_outermost = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
+                    assert_eq!(
+                        level.texels[at..at + 4],
+                        if is_outermost { grey } else { [200, 100, 50, 255] },
+                        "{x} {y} of {width} {height}"
+                    );
+                    assert_eq!(plain.texels[at..at + 4], [200, 100, 50, 255]);
+                }
+            }
+        }
+        let larger = texture.within(2, grey);
+        assert_eq!((larger.size_px, larger.rgba8.len()), ([16, 13], 4 * 16 * 13));
+        assert_eq!(
+            [larger.linear_at([1, 6]), larger.linear_at([2, 2])],
+            [grey, [200, 100, 50, 255]].map(|c| Texture::uniform(c, Encoding::Srgb).linear_at([0, 0]))
+        );
+        let halves = texture.mips_within(TexelForm::Light, Some(grey));
+        assert_eq!(halves[0].texels[..8], *texture.texels(&grey, TexelForm::Light));
     }
 
     #[test]

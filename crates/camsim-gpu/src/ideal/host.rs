@@ -157,7 +157,7 @@ impl HostScene {
         }
         let mut pictures = Pictures::default();
         let ground = match &scene.terrain {
-            Some(terrain) => Picture::new(&terrain.texture, [Wrap::Clamp; 2]),
+            Some(terrain) => Picture::new(&terrain.texture, [Wrap::Clamp; 2], terrain.beyond),
             None => Picture::Uniform([0.0; 4]),
         };
         let mut paints = vec![Paint { picture: Arc::new(ground), tint: [1.0; 3], emissive: [0.0; 3], has_more: false, sky: None }];
@@ -385,6 +385,6 @@ impl Pictures {
     fn of(&mut self, batch: &MeshBatch) -> Arc<Picture> {
         let look = &batch.look;
         let name = (Arc::as_ptr(&look.texture), look.wrap.map(|wrap| wrap as u8));
-        self.0.entry(name).or_insert_with(|| Arc::new(Picture::new(&look.texture, look.wrap))).clone()
+        self.0.entry(name).or_insert_with(|| Arc::new(Picture::new(&look.texture, look.wrap, None))).clone()
     }
 }

@@ -33,6 +33,7 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         fog_visibility_m: spec.fog_visibility_m,
         ..Scene::default()
     };
+    let mut notes = Vec::new();
     let mut summary = None;
     if let Some(terrain) = &spec.terrain {
         let frame = log.frame.as_ref().ok_or_else(|| no_origin(scenario, "scene.terrain"))?;
@@ -42,6 +43,7 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
         let loaded = read_terrain_in_light(terrain, &ned, shift, light.as_ref())?;
         scene.terrain = Some(loaded.terrain);
         summary = Some(loaded.summary);
+        notes.extend(loaded.notes);
     }
     if let Some(pattern) = &spec.pattern {
         let of_pattern = |source| LoadError::Picture { key: "scene.pattern.image", source };
@@ -51,7 +53,6 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
     if let Some(spec) = &spec.board {
         scene.meshes.push(read_board(spec)?.mesh(board_place(scenario, spec, log)?, ned_from_board(spec.angles_deg)));
     }
-    let mut notes = Vec::new();
     if light.is_some() && scene.terrain.is_none() && spec.gltf.is_empty() {
         notes.push("scene.light changes nothing: it falls on terrain and models, of which the scene has none; patterns and boards keep their colours".to_owned());
     }

@@ -1,6 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use camsim_core::scenario::{Auto, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, OutputSpec, QualitySpec, Readout, TrackerSpec};
+use camsim_core::scenario::{
+    Auto, Beyond, BoardKind, BoardSpec, CameraSpec, Dictionary, FieldOr, HeightUnit, OutputSpec, QualitySpec, Readout, TrackerSpec,
+};
 
 use super::{schema::KEYS, *};
 
@@ -61,7 +63,9 @@ fn every_key_of_the_structs_is_in_the_schema() {
     text += "[[camera.zoom]]\nat = 1\nfocal_px = [1, 1]\nprincipal_point_px = [0, 0]\n";
     text += "[[camera.mount.vibration]]\naxis = \"roll\"\nhz = 3\n";
     let mut scenario = parse(&text).unwrap();
-    scenario.scene.terrain.as_mut().unwrap().epsg = Some(32632);
+    let terrain = scenario.scene.terrain.as_mut().unwrap();
+    (terrain.epsg, terrain.height_unit, terrain.ortho_white) = (Some(32632), Some(HeightUnit::UsFt), Some(2047.0));
+    terrain.beyond = Beyond::Edge;
     assert_eq!(scenario.scene.board, Some(BoardSpec { kind: Some(BoardKind::Chessboard), ..board(9, 6, 0.05) }));
     let saved = toml::to_string(&scenario).unwrap();
     assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario, "a saved scenario reads back");

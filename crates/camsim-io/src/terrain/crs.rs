@@ -7,10 +7,17 @@ use proj4rs::{proj::Proj, transform::transform};
 /// Radius of the sphere of EPSG:3857, metres.
 const WEB_MERCATOR_RADIUS_M: f64 = 6_378_137.0;
 
+/// What the EPSG registry says of each system that is known beside WGS-84's UTM zones and 3857: kind;code;name;definition;metres by which the shift of its
+/// datum may be off. Datums without a shift are taken for WGS-84, from which they differ by a metre or two (ETRS89, NAD83 and the like).
+pub(crate) const SYSTEMS: &str = include_str!("crs/systems.csv");
+
 /// A known coordinate reference system.
 #[derive(Debug)]
-pub(super) struct Crs {
+pub(crate) struct Crs {
     pub epsg: u16,
+    pub name: String,
+    /// Metres by which its datum may be off.
+    pub accuracy_m: Option<f64>,
     kind: Kind,
 }
 
@@ -25,22 +32,87 @@ enum Kind {
     },
 }
 
+/// A vertical system.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct VerticalCrs {
+    pub epsg: u16,
+    pub name: &'static str,
+    /// Metres in its unit; less than 0 where it counts downwards.
+    pub metres_per_unit: f64,
+}
+
+/// Name, definition and accuracy in a line of [`SYSTEMS`].
+fn line_of(kind: &str, epsg: u16) -> Option<[&'static str; 3]> {
+    SYSTEMS.lines().find_map(|line| {
+        let rest = line.strip_prefix(kind)?.strip_prefix(';')?;
+        let (code, rest) = rest.split_once(';')?;
+        let mut words = rest.split(';');
+        (code.parse() == Ok(epsg)).then(|| [0; 3].map(|_| words.next().unwrap_or_default()))
+    })
+}
+
+/// The horizontal and the vertical system of a code that stands for both.
+pub(crate) fn compound(epsg: u16) -> Option<[u16; 2]> {
+    let [_, parts, _] = line_of("compound", epsg)?;
+    let (horizontal, vertical) = parts.split_once(' ')?;
+    Some([horizontal.parse().ok()?, vertical.parse().ok()?])
+}
+
+impl VerticalCrs {
+    /// `None` for a code that is not known.
+    pub fn new(epsg: u16) -> Option<Self> {
+        let [name, metres, _] = line_of("vertical", epsg)?;
+        Some(Self { epsg, name, metres_per_unit: metres.parse().ok()? })
+    }
+}
+
 impl Crs {
     /// `None` for a code that is not known.
     pub fn new(epsg: u16) -> Option<Self> {
-        let kind = match epsg {
-            4326 | 4258 | 4979 => Kind::Geographic,
-            3857 => Kind::WebMercator,
-            _ => Kind::Projected {
-                projection: Box::new(Proj::from_proj_string(&projection_text(epsg)?).ok()?),
-                wgs84: Box::new(Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").ok()?),
-            },
-        };
-        Some(Self { epsg, kind })
+        let wgs84 = |name: String, kind| Some(Self { epsg, name, accuracy_m: None, kind });
+        match epsg {
+            3857 => return wgs84("WGS 84 / Pseudo-Mercator".into(), Kind::WebMercator),
+            32601..=32660 => {
+                return wgs84(
+                    format!("WGS 84 / UTM zone {}N", epsg - 32600),
+                    projected(&format!("+proj=utm +zone={} +ellps=WGS84", epsg - 32600))?,
+                );
+            }
+            32701..=32760 => {
+                return wgs84(
+                    format!("WGS 84 / UTM zone {}S", epsg - 32700),
+                    projected(&format!("+proj=utm +zone={} +south +ellps=WGS84", epsg - 32700))?,
+                );
+            }
+            _ => {}
+        }
+        if let Some([name, ..]) = line_of("geographic", epsg) {
+            return wgs84(name.into(), Kind::Geographic);
+        }
+        let [name, definition, accuracy] = line_of("projected", epsg)?;
+        Some(Self { epsg, name: name.into(), accuracy_m: accuracy.parse().ok(), kind: projected(definition)? })
     }
 
     pub fn is_geographic(&self) -> bool {
         matches!(self.kind, Kind::Geographic)
+    }
+
+    /// Metres in a unit of its coordinates; `None` for degrees.
+    pub fn metres_per_unit(&self) -> Option<f64> {
+        match &self.kind {
+            Kind::Geographic => None,
+            Kind::WebMercator => Some(1.0),
+            Kind::Projected { projection, .. } => Some(projection.to_meter()),
+        }
+    }
+
+    /// After how much of x the Earth begins again.
+    pub fn period(&self) -> Option<f64> {
+        match self.kind {
+            Kind::Geographic => Some(360.0),
+            Kind::WebMercator => Some(std::f64::consts::TAU * WEB_MERCATOR_RADIUS_M),
+            Kind::Projected { .. } => None,
+        }
     }
 
     /// Latitude, longitude in radians; `None` outside of the projection's domain.
@@ -73,17 +145,12 @@ impl Crs {
     }
 }
 
-/// Definition in PROJ's notation, after the EPSG registry. ETRS89 is taken for WGS-84 (they differ by less than a metre).
-fn projection_text(epsg: u16) -> Option<String> {
-    const SWISS: &str = "+proj=somerc +lat_0=46.9524055555556 +lon_0=7.43958333333333 +k_0=1 +ellps=bessel \
-                         +towgs84=674.374,15.056,405.346,0,0,0,0 +units=m +no_defs";
-    Some(match epsg {
-        32601..=32660 => format!("+proj=utm +zone={} +datum=WGS84 +units=m +no_defs", epsg - 32600),
-        32701..=32760 => format!("+proj=utm +zone={} +south +datum=WGS84 +units=m +no_defs", epsg - 32700),
-        25828..=25838 => format!("+proj=utm +zone={} +ellps=GRS80 +towgs84=0,0,0,0,0,0,0 +units=m +no_defs", epsg - 25800),
-        21781 => format!("{SWISS} +x_0=600000 +y_0=200000"),
-        2056 => format!("{SWISS} +x_0=2600000 +y_0=1200000"),
-        _ => return None,
+/// By a definition in PROJ's notation.
+fn projected(definition: &str) -> Option<Kind> {
+    let shift = if definition.contains("+towgs84") { "" } else { "+towgs84=0,0,0" };
+    Some(Kind::Projected {
+        projection: Box::new(Proj::from_proj_string(&format!("{definition} {shift} +no_defs")).ok()?),
+        wgs84: Box::new(Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").ok()?),
     })
 }
 
@@ -115,6 +182,46 @@ mod tests {
         assert_near(degrees(32733, [500_000.0, 10_000_000.0]), [0.0, 15.0], 1e-3);
     }
 
+    /// By PROJ, two for each system: scripts/goldens/crs_table.py.
+    #[test]
+    fn every_system_is_where_proj_has_it() {
+        let points = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/crs_points.csv")).unwrap();
+        let mut seen = std::collections::BTreeSet::new();
+        let mut wrong = Vec::new();
+        for line in points.lines().skip(2) {
+            let numbers: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
+            let [epsg, x, y, lat, lon] = numbers[..] else { panic!("{line}") };
+            let crs = Crs::new(epsg as u16).unwrap_or_else(|| panic!("{line}"));
+            let found = crs.geodetic_from_model([x, y]).map(|place| place.map(f64::to_degrees));
+            let back = crs.model_from_geodetic([lat.to_radians(), lon.to_radians()]);
+            let (Some(found), Some(back)) = (found, back) else {
+                wrong.push(line.to_owned());
+                continue;
+            };
+            let unit_m = crs.metres_per_unit().unwrap();
+            let off_m = [(found[0] - lat) * 111_000.0, (found[1] - lon) * 111_000.0 * lat.to_radians().cos()];
+            let back_m = [(back[0] - x) * unit_m, (back[1] - y) * unit_m];
+            // Datum shifts drop their height, which costs some hundredths of a millimetre; series of projections are good to a millimetre.
+            if off_m.iter().chain(&back_m).any(|metres| metres.abs() > 2e-3) {
+                wrong.push(format!("{line}: off by {off_m:?} m, back by {back_m:?} m"));
+            }
+            seen.insert(epsg as u16);
+        }
+        assert!(wrong.is_empty(), "{} of {}:\n{}", wrong.len(), 2 * seen.len(), wrong.join("\n"));
+        let listed = SYSTEMS.lines().filter(|line| line.starts_with("projected;")).count();
+        assert_eq!(seen.len(), listed);
+    }
+
+    #[test]
+    fn heights_have_their_unit_and_pairs_their_parts() {
+        let feet = VerticalCrs::new(6360).unwrap();
+        assert!(feet.name == "NAVD88 height (ftUS)" && (feet.metres_per_unit - 1200.0 / 3937.0).abs() < 1e-15);
+        assert_eq!(VerticalCrs::new(5773).map(|crs| crs.metres_per_unit), Some(1.0));
+        assert_eq!(VerticalCrs::new(8228).map(|crs| crs.metres_per_unit), Some(0.3048));
+        assert_eq!(VerticalCrs::new(32632), None);
+        assert_eq!((compound(7405), compound(7415), compound(4326)), (Some([27700, 5701]), Some([28992, 5709]), None));
+    }
+
     #[test]
     fn every_known_system_returns() {
         for (epsg, place) in [
@@ -136,7 +243,7 @@ mod tests {
 
     #[test]
     fn unknown_codes_and_impossible_places_have_no_answer() {
-        assert!([0, 1, 2154, 32600, 32661, 32767, 25827].iter().all(|&epsg| Crs::new(epsg).is_none()));
+        assert!([0, 1, 2100, 27573, 32600, 32767, 25827].iter().all(|&epsg| Crs::new(epsg).is_none()));
         assert_eq!(Crs::new(4326).unwrap().geodetic_from_model([8.0, 95.0]), None);
         for model in [[f64::NAN, 0.0], [f64::INFINITY, 1.0], [1e300, 1e300]] {
             for epsg in [4326, 3857, 21781, 32632] {

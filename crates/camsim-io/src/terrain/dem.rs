@@ -4,15 +4,24 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use camsim_core::scenario::{HeightReference, TerrainSpec};
+
 use super::{
-    TerrainFileError,
+    TerrainFileError, beside,
     crs::Crs,
+    geo_tags::GeoTags,
     georeference::{self, Affine, world_file},
+    height_files,
     raster::Raster,
+    systems::{Datum, Stated, Vertical, unit_of_code, unit_of_name},
+    tiff_file::Sample,
 };
 
 /// Heights outside of this are garbage or undeclared "no data" marks, metres: from below the deepest sea to above the highest mountain.
 const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
+
+/// What lies outside of it but within this may be a height in another unit; marks lie farther away.
+const NUMBERS_NOT_MARKS: f64 = 1e6;
 
 /// The mark that most often means "no data" where the file does not declare one.
 const COMMON_NODATA: f64 = -9999.0;
@@ -25,19 +34,23 @@ pub(super) struct Dem {
     raster: Raster,
     /// Whether the file counts columns from the east, rows from the south.
     is_reversed: [bool; 2],
-    /// What a height of the file is multiplied by.
-    metres_per_unit: f64,
-    /// Value of heights that are not there.
-    nodata: f64,
+    /// Metres of a stored number: this times it, and this more.
+    metres: [f64; 2],
+    /// Stored numbers of heights that are not there.
+    nodata: [f64; 2],
     /// Model coordinates of pixel corners.
     pub model_from_pixel: Affine,
     pub crs: Crs,
+    /// What there is to say about it.
+    pub notes: Vec<String>,
 }
 
 /// What all heights come to.
 pub(super) struct Heights {
     pub range_m: [f64; 2],
     pub voids: u64,
+    /// Of the voids: numbers that may be heights in another unit.
+    pub implausible: u64,
 }
 
 pub(super) const EMPTY_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
@@ -47,33 +60,49 @@ pub(super) fn widened([low, high]: [f64; 2], value: f64) -> [f64; 2] {
 }
 
 impl Dem {
-    pub fn read(path: &Path, wanted_epsg: Option<u16>) -> Result<Self, TerrainFileError> {
-        let raster = Raster::read(path).map_err(TerrainFileError::of_dem)?;
+    /// `converts`: whether heights go through the geoid.
+    pub fn read(spec: &TerrainSpec, converts: bool) -> Result<Self, TerrainFileError> {
+        let path = spec.dem.as_path();
+        let mut raster = height_files::read(path)?;
+        beside::read_tags(path, &mut raster.geo)?;
+        beside::read_mask(path, &mut raster).map_err(TerrainFileError::of_dem)?;
         let geo = &raster.geo;
-        let epsg = match (geo.epsg, wanted_epsg) {
-            (Some(stated), Some(wanted)) if stated != wanted && Crs::new(stated).is_some() => {
-                return Err(TerrainFileError::CrsConflict { path: path.into(), stated, wanted });
-            }
-            (_, Some(wanted)) => wanted,
-            (Some(stated), None) => stated,
-            (None, None) => return Err(missing(path, &raster)?),
-        };
-        let crs = Crs::new(epsg).ok_or_else(|| TerrainFileError::UnsupportedCrs { path: path.into(), epsg })?;
-        let model_from_pixel = georeference_of(path, geo.model_from_pixel)?.ok_or_else(|| no_georeference(path))?;
-        if !crs.is_geographic() && geo.horizontal_unit.is_some_and(|unit| unit != 9001) {
-            return Err(TerrainFileError::Unit { path: path.into(), what: "horizontal", code: geo.horizontal_unit.unwrap_or(0) });
-        }
-        let metres_per_unit = match geo.vertical_unit {
-            None | Some(9001) => 1.0,
-            Some(9002) => 0.3048,
-            Some(9003) => 1200.0 / 3937.0,
-            Some(code) => return Err(TerrainFileError::Unit { path: path.into(), what: "vertical", code }),
-        };
+        let (found, mut notes) = georeference_of(path, geo.model_from_pixel)?;
+        let stated = Stated::of(path, geo)?;
+        // The more basic lack is reported first.
+        let model_from_pixel = found.ok_or_else(|| no_georeference(path, geo))?;
+        let crs = stated.crs(path, geo, spec.epsg)?;
         if raster.bands() > 2 {
             return Err(TerrainFileError::NotHeights { path: path.into(), bands: raster.bands() });
         }
-        let (size, nodata) = (raster.size, geo.nodata.unwrap_or(COMMON_NODATA));
-        let mut dem = Self { path: path.into(), size, raster, is_reversed: [false; 2], metres_per_unit, nodata, model_from_pixel, crs };
+        notes.extend(geo.notes.iter().cloned());
+        let vertical = stated.vertical.map(|code| Vertical::of(code, &geo.keys.vertical_citation));
+        notes.extend(vertical.as_ref().and_then(|vertical| vertical.note(spec.height, converts)));
+        if vertical.is_none() && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955) && spec.height == HeightReference::Msl {
+            let three = Vertical { code: crs.epsg, datum: Some(Datum::Ellipsoid), name: crs.name.clone(), metres_per_unit: Some(1.0) };
+            notes.extend(three.note(spec.height, converts));
+        }
+        notes.extend(crs.accuracy_m.filter(|metres| *metres >= 2.0).map(|metres| {
+            format!(
+                "EPSG:{} ({}) comes to WGS-84 by a shift that may be off by {metres} m: the log may lie beside the terrain by as much",
+                crs.epsg, crs.name
+            )
+        }));
+        if raster.bands() == 2 && !raster.image.extra.iter().any(|extra| matches!(extra, 1 | 2)) {
+            notes.push("holds a second band, which is left out".to_owned());
+        }
+        if let Some(orientation) = geo.orientation {
+            notes.push(format!("its orientation (tag 274: {orientation}) is not used: rows and columns lie where the georeference says"));
+        }
+        let unit_m = unit_m(spec, geo, vertical.as_ref(), &crs)?;
+        let [scale, offset] = scale_and_offset(path, geo, vertical.is_some(), &mut notes)?;
+        // Where no mark is declared, the usual ones are marks.
+        let lowest = if raster.image.sample == Sample::I16 { f64::from(i16::MIN) } else { COMMON_NODATA };
+        let nodata = geo.nodata.map_or([COMMON_NODATA, lowest], |mark| [mark; 2]);
+        let notes = notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
+        let metres = [unit_m * scale, unit_m * offset];
+        let mut dem =
+            Self { path: path.into(), size: raster.size, raster, is_reversed: [false; 2], metres, nodata, model_from_pixel, crs, notes };
         dem.turn_north_up();
         Ok(dem)
     }
@@ -102,23 +131,38 @@ impl Dem {
 
     /// Metres; NaN = void.
     pub fn height_m(&self, at: [u32; 2]) -> f64 {
-        let [column, row] = [0, 1].map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
-        let height = self.raster.value(row * self.size[0] as usize + column);
+        let metres = self.stored_m(at);
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
+        if (lowest..=highest).contains(&metres) { metres } else { f64::NAN }
+    }
+
+    /// Whether plausible or not; NaN where the file says that there is nothing.
+    fn stored_m(&self, at: [u32; 2]) -> f64 {
+        let [column, row] = [0, 1].map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
+        let pixel = row * self.size[0] as usize + column;
+        let stored = self.raster.value(pixel);
         // A float32 file may declare its mark with more digits than it holds.
-        let is_nodata = height == self.nodata || height as f32 == self.nodata as f32;
-        let metres = height * self.metres_per_unit;
-        if is_nodata || !(lowest..=highest).contains(&metres) { f64::NAN } else { metres }
+        let is_nodata = self.nodata.iter().any(|mark| stored == *mark || stored as f32 == *mark as f32);
+        let is_clear = self.raster.bands() == 2
+            && self.raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2))
+            && self.raster.image.value(pixel, 1) == 0.0;
+        if is_nodata || is_clear || !self.raster.is_valid(pixel) { f64::NAN } else { stored * self.metres[0] + self.metres[1] }
     }
 
     pub fn heights(&self) -> Heights {
+        let none = || Heights { range_m: EMPTY_RANGE, voids: 0, implausible: 0 };
+        let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
         let rows = (0..self.size[1]).into_par_iter().map(|row| {
-            let heights = (0..self.size[0]).map(|column| self.height_m([column, row]));
-            heights.fold((EMPTY_RANGE, 0), |(range, voids), m| if m.is_nan() { (range, voids + 1) } else { (widened(range, m), voids) })
+            (0..self.size[0]).fold(none(), |all, column| match self.stored_m([column, row]) {
+                m if (lowest..=highest).contains(&m) => Heights { range_m: widened(all.range_m, m), ..all },
+                m => Heights { voids: all.voids + 1, implausible: all.implausible + u64::from(m.abs() < NUMBERS_NOT_MARKS), ..all },
+            })
         });
-        let (range_m, voids) =
-            rows.reduce(|| (EMPTY_RANGE, 0), |(range, voids), ([low, high], more)| (widened(widened(range, low), high), voids + more));
-        Heights { range_m, voids }
+        rows.reduce(none, |a, b| Heights {
+            range_m: widened(widened(a.range_m, b.range_m[0]), b.range_m[1]),
+            voids: a.voids + b.voids,
+            implausible: a.implausible + b.implausible,
+        })
     }
 
     /// Pixel coordinates (corner convention) of a sample.
@@ -136,7 +180,12 @@ impl Dem {
     }
 
     pub fn count_outside_crs(&self) -> u64 {
-        (0..self.points() as usize).into_par_iter().filter(|&index| self.geodetic_rad(self.column_and_row(index)).is_none()).count() as u64
+        self.count(|at| self.geodetic_rad(at).is_none())
+    }
+
+    /// Samples of which something holds.
+    pub fn count(&self, holds: impl Fn([u32; 2]) -> bool + Sync) -> u64 {
+        (0..self.points() as usize).into_par_iter().filter(|&index| holds(self.column_and_row(index))).count() as u64
     }
 
     /// The outermost samples.
@@ -146,28 +195,109 @@ impl Dem {
     }
 }
 
-/// From the file's own tags, or from a world file beside it.
-pub(super) fn georeference_of(path: &Path, from_tags: Option<Affine>) -> Result<Option<Affine>, TerrainFileError> {
-    let found = match from_tags {
-        Some(affine) => Some(affine),
-        None => world_file(path)?,
-    };
-    match found {
-        Some(affine) if affine.inverse().is_none() => Err(TerrainFileError::DegenerateGeoreference { path: path.into() }),
-        found => Ok(found),
+/// Metres in the unit of the heights. Where the file says two units or where it may be one of two, the key decides.
+fn unit_m(spec: &TerrainSpec, geo: &GeoTags, vertical: Option<&Vertical>, crs: &Crs) -> Result<f64, TerrainFileError> {
+    let path = &spec.dem;
+    let meaning = |problem: String| TerrainFileError::Meaning { path: path.clone(), problem };
+    let unit_of_key = spec.height_unit.map(|unit| unit.metres());
+    let mut stated: Vec<(String, f64)> = Vec::new();
+    if let Some(name) = geo.bands.first().and_then(|band| band.unit.as_ref()) {
+        match unit_of_name(name) {
+            Some(unit) => stated.push((format!("unit `{name}`"), unit)),
+            None if unit_of_key.is_none() => {
+                return Err(meaning(format!(
+                    "states `{name}` as the unit of its heights, which is not known: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
+                )));
+            }
+            None => {}
+        }
+    }
+    if let Some(Vertical { code, name, metres_per_unit: Some(unit), .. }) = vertical {
+        if *unit < 0.0 {
+            return Err(meaning(format!(
+                "states depths (EPSG:{code}, {name}), which count downwards: turn them into heights with `gdal_calc.py -A IN --calc=-A --outfile OUT`"
+            )));
+        }
+        stated.push((format!("EPSG:{code} ({name})"), *unit));
+    }
+    if let Some(code) = geo.keys.vertical_unit {
+        match unit_of_code(code) {
+            Some(unit) => stated.push((format!("VerticalUnits {code}"), unit)),
+            None if unit_of_key.is_none() => return Err(TerrainFileError::Unit { path: path.clone(), what: "vertical", code }),
+            None => {}
+        }
+    }
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    let agree = stated.windows(2).all(|pair| close(pair[0].1, pair[1].1));
+    let all = || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
+    match (unit_of_key, stated.first()) {
+        (Some(unit), Some(_)) if !stated.iter().any(|(_, stated)| close(*stated, unit)) => {
+            Err(meaning(format!("states {}, but scene.terrain.height_unit has {unit} m: remove the key, or correct the file", all())))
+        }
+        (Some(unit), _) => Ok(unit),
+        (None, Some(_)) if !agree => Err(meaning(format!("states {}: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"", all()))),
+        (None, Some((_, unit))) => Ok(*unit),
+        // Who maps in feet may have heights in feet, or not.
+        (None, None) if crs.metres_per_unit().is_some_and(|unit| !close(unit, 1.0)) => Err(meaning(format!(
+            "EPSG:{} ({}) counts in feet, and nothing says whether the heights do: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\"",
+            crs.epsg, crs.name
+        ))),
+        (None, None) => Ok(1.0),
     }
 }
 
-/// A DEM without a coordinate system: the more basic lack is reported first.
-fn missing(path: &Path, raster: &Raster) -> Result<TerrainFileError, TerrainFileError> {
-    Ok(match georeference_of(path, raster.geo.model_from_pixel)? {
-        None => no_georeference(path),
-        Some(_) => TerrainFileError::NoCrs { path: path.into() },
-    })
+/// `scale x stored + offset` in the unit of the heights.
+fn scale_and_offset(path: &Path, geo: &GeoTags, has_vertical: bool, notes: &mut Vec<String>) -> Result<[f64; 2], TerrainFileError> {
+    let meaning = |problem: String| TerrainFileError::Meaning { path: path.into(), problem };
+    let band = geo.bands.first().map(|band| (band.scale, band.offset)).filter(|(scale, offset)| scale.is_some() || offset.is_some());
+    let of_band = band.map(|(scale, offset)| [scale.unwrap_or(1.0), offset.unwrap_or(0.0)]);
+    if of_band.is_some_and(|[scale, _]| scale == 0.0) {
+        return Err(meaning("states a scale of 0 for its heights (GDAL_METADATA): correct the file".into()));
+    }
+    match (of_band, geo.vertical_scale) {
+        (Some(band), Some(place)) if has_vertical && band != place => Err(meaning(format!(
+            "states two scales of its heights, {band:?} (GDAL_METADATA) and {place:?} (ModelPixelScale and ModelTiepoint): remove one with `gdal_translate`"
+        ))),
+        // It scales heights where there is a vertical system, as for GDAL; elsewhere writers leave anything there.
+        (None, Some(place)) if has_vertical => Ok(place),
+        (of_band, Some([scale, offset])) if !has_vertical => {
+            notes.push(format!(
+                "the third numbers of ModelPixelScale and ModelTiepoint (scale {scale}, offset {offset}) are not applied: the file states no vertical system"
+            ));
+            Ok(of_band.unwrap_or([1.0, 0.0]))
+        }
+        (of_band, _) => Ok(of_band.unwrap_or([1.0, 0.0])),
+    }
 }
 
-fn no_georeference(path: &Path) -> TerrainFileError {
+/// From the file's own tags, or from a world file beside it; with what there is to say.
+pub(super) fn georeference_of(path: &Path, from_tags: Option<Affine>) -> Result<(Option<Affine>, Vec<String>), TerrainFileError> {
+    let (found, notes) = match from_tags {
+        Some(affine) => {
+            // One that cannot be read has no say, since it is not needed.
+            let other = world_file(path).ok().flatten().filter(|other| !is_same_place(&affine, other));
+            (Some(affine), other.map(|_| "a world file beside it says another place than its own tags, and is not used".to_owned()))
+        }
+        None => (world_file(path)?, None),
+    };
+    match found {
+        Some(affine) if affine.inverse().is_none() => Err(TerrainFileError::DegenerateGeoreference { path: path.into() }),
+        found => Ok((found, notes.into_iter().collect())),
+    }
+}
+
+/// To a hundredth of a pixel at the corner, and a millionth in size.
+fn is_same_place(a: &Affine, b: &Affine) -> bool {
+    let Some(pixel_from_model) = a.inverse() else { return true };
+    let near = |at: [f64; 2]| {
+        let there = pixel_from_model.apply(b.apply(at));
+        (0..2).all(|k| (there[k] - at[k]).abs() < 0.01 + 1e-6 * at[k])
+    };
+    near([0.0, 0.0]) && near([1000.0, 1000.0])
+}
+
+fn no_georeference(path: &Path, geo: &GeoTags) -> TerrainFileError {
     let world = georeference::world_file_names(path).into_iter().next().unwrap_or_default();
     let world = world.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    TerrainFileError::NoGeoreference { path: path.into(), world }
+    TerrainFileError::NoGeoreference { path: path.into(), world, more: geo.notes.iter().map(|note| format!(" ({note})")).collect() }
 }

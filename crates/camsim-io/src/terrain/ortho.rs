@@ -2,80 +2,197 @@
 
 use std::path::Path;
 
-use camsim_core::scene::{Encoding, Texture};
+use camsim_core::{
+    scenario::{Beyond, TerrainSpec},
+    scene::{Encoding, Texture, linear_from_srgb, srgb_from_linear},
+};
 
 use super::{
-    TerrainFileError,
+    TerrainFileError, beside,
     crs::Crs,
     dem::{Dem, georeference_of},
+    geo_tags::GeoTags,
     georeference::Affine,
-    raster::{self, GeoTags, Raster},
+    raster::{Raster, is_tiff},
+    systems::Stated,
 };
-use crate::pictures::{PictureError, read_texture};
+use crate::pictures::{PictureError, read_stored};
 
 /// A picture of the ground.
 pub(super) struct Ortho {
     pub texture: Texture,
     /// `None`: it covers the DEM's extent.
     pub place: Option<OrthoPlace>,
+    /// Whether there is something at its pixels, where it does not cover all of them.
+    content: Option<Vec<bool>>,
+    /// What there is to say about it.
+    pub notes: Vec<String>,
 }
+
+/// Pixels of grey around a picture that ends before the ground does: as many as a screen's pixel may cover before the colours at the picture's very border are
+/// drawn less exactly than to a texel.
+const MARGIN_PX: u32 = 64;
 
 /// Where a picture lies.
 pub(super) struct OrthoPlace {
     pixel_from_model: Affine,
-    /// `None` for the DEM's own.
-    crs: Option<Crs>,
+    crs: Crs,
+    /// Whether that is the DEM's own.
+    is_of_dem: bool,
     size: [f64; 2],
+    /// Its middle, in its own coordinates.
+    middle_x: f64,
+    /// Pixels that it was made larger on each side.
+    margin_px: f64,
 }
 
 impl OrthoPlace {
-    pub fn uv(&self, dem: &Dem, at: [u32; 2]) -> [f32; 2] {
-        let model = match &self.crs {
-            None => Some(dem.model(at)),
-            Some(crs) => dem.geodetic_rad(at).and_then(|place| crs.model_from_geodetic(place)),
-        };
+    /// Pixel coordinates of a height on the picture as it is stored.
+    fn pixel(&self, dem: &Dem, at: [u32; 2]) -> [f64; 2] {
+        let model =
+            if self.is_of_dem { Some(dem.model(at)) } else { dem.geodetic_rad(at).and_then(|place| self.crs.model_from_geodetic(place)) };
+        // 190 degrees east are 170 degrees west.
+        let model = model.map(|[x, y]| [x - self.crs.period().map_or(0.0, |period| period * ((x - self.middle_x) / period).round()), y]);
         // A point that the picture's projection does not reach is outside of the picture.
-        let pixel = model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model));
-        [(pixel[0] / self.size[0]) as f32, (pixel[1] / self.size[1]) as f32]
+        model.map_or([-1.0, -1.0], |model| self.pixel_from_model.apply(model))
+    }
+
+    fn is_inside(&self, pixel: [f64; 2]) -> bool {
+        (0..2).all(|k| (0.0..=self.size[k]).contains(&pixel[k]))
+    }
+
+    /// Texture coordinates.
+    pub fn uv(&self, dem: &Dem, at: [u32; 2]) -> [f32; 2] {
+        let pixel = self.pixel(dem, at);
+        [0, 1].map(|k: usize| ((pixel[k] + self.margin_px) / (self.size[k] + 2.0 * self.margin_px)) as f32)
     }
 }
 
 impl Ortho {
-    pub fn read(path: &Path, dem: &Dem) -> Result<Self, TerrainFileError> {
-        let (mut texture, geo) = picture(path).map_err(TerrainFileError::of_ortho)?;
-        let Some(model_from_pixel) = georeference_of(path, geo.as_ref().and_then(|geo| geo.model_from_pixel))? else {
-            texture.bleed_into_transparent();
-            return Ok(Self { texture, place: None });
+    pub fn read(path: &Path, spec: &TerrainSpec, dem: &Dem) -> Result<Self, TerrainFileError> {
+        let (mut texture, geo, mut notes) = picture(path, spec)?;
+        let (found, more) = georeference_of(path, geo.model_from_pixel)?;
+        notes.extend(more);
+        let Some(model_from_pixel) = found else {
+            if let Some(orientation) = geo.orientation {
+                texture = crate::pictures::oriented(texture, orientation);
+            }
+            notes.extend(geo.notes);
+            let content = content_of(&texture);
+            finish(&mut texture, None, spec.beyond);
+            return Ok(Self { texture, place: None, content, notes: with_name(path, notes) });
         };
+        notes.extend(geo.notes.iter().cloned());
+        if let Some(orientation) = geo.orientation {
+            notes.push(format!("its orientation (EXIF or tag 274: {orientation}) is not used: its rows lie where its georeference says"));
+        }
+        let stated = Stated::of(path, &geo)?;
         // A world file states no coordinate system: then it is the DEM's.
-        let epsg = geo.as_ref().and_then(|geo| geo.epsg).unwrap_or(dem.crs.epsg);
-        let crs = Crs::new(epsg).ok_or_else(|| TerrainFileError::UnsupportedCrs { path: path.into(), epsg })?;
+        let assumed = (stated.horizontal.is_none() && stated.own.is_none()).then_some(dem.crs.epsg);
+        let crs = stated.crs(path, &geo, assumed)?;
         let pixel_from_model = model_from_pixel.inverse().ok_or_else(|| TerrainFileError::DegenerateGeoreference { path: path.into() })?;
-        let crs = (crs.epsg != dem.crs.epsg).then_some(crs);
         let size = texture.size_px.map(f64::from);
-        mark_void_pixels(&mut texture, dem, &model_from_pixel);
-        texture.bleed_into_transparent();
-        Ok(Self { texture, place: Some(OrthoPlace { pixel_from_model, crs, size }) })
+        let content = content_of(&texture);
+        let over_voids = over_voids(&texture, dem, &model_from_pixel);
+        finish(&mut texture, over_voids.as_deref(), spec.beyond);
+        let middle_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
+        let mut place = OrthoPlace { pixel_from_model, is_of_dem: crs.epsg == dem.crs.epsg, crs, size, middle_x, margin_px: 0.0 };
+        // What holds the border of the ground holds the ground.
+        if spec.beyond == Beyond::Grey && dem.border().any(|at| !place.is_inside(place.pixel(dem, at))) {
+            texture = texture.within(MARGIN_PX, [GREY, GREY, GREY, 255]);
+            place.margin_px = f64::from(MARGIN_PX);
+        }
+        Ok(Self { texture, place: Some(place), content, notes: with_name(path, notes) })
+    }
+
+    /// The colour of ground beyond it, if that is one.
+    pub fn color_beyond(&self) -> Option<[u8; 4]> {
+        self.place.as_ref().filter(|place| place.margin_px > 0.0).map(|_| [GREY, GREY, GREY, 255])
+    }
+
+    /// Texture coordinates of its own corners.
+    pub fn own_uv(&self) -> [[f64; 2]; 2] {
+        let Some(OrthoPlace { size, margin_px, .. }) = &self.place else { return [[0.0; 2], [1.0; 2]] };
+        let share = size.map(|side| margin_px / (side + 2.0 * margin_px));
+        [share, share.map(|share| 1.0 - share)]
+    }
+
+    /// Whether it shows something at a height.
+    pub fn shows(&self, dem: &Dem, at: [u32; 2]) -> bool {
+        let pixel = match &self.place {
+            Some(place) => place.pixel(dem, at),
+            None => [0, 1].map(|k: usize| (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])),
+        };
+        if self.place.as_ref().is_some_and(|place| !place.is_inside(pixel)) {
+            return false;
+        }
+        let Some(content) = &self.content else { return true };
+        let size = self.place.as_ref().map_or(self.texture.size_px.map(f64::from), |place| place.size);
+        let [x, y] = [0, 1].map(|k: usize| pixel[k].min(size[k] - 1.0) as usize);
+        content[y * size[0] as usize + x]
     }
 }
 
-/// With what a TIFF file says about its place.
-fn picture(path: &Path) -> Result<(Texture, Option<GeoTags>), PictureError> {
-    if !raster::is_tiff(path)? {
-        return Ok((read_texture(path, Encoding::Srgb)?, None));
-    }
-    let raster = Raster::read(path)?;
-    Ok((raster.to_texture(path, Encoding::Srgb)?, Some(raster.geo)))
+fn content_of(texture: &Texture) -> Option<Vec<bool>> {
+    let content: Vec<bool> = texture.rgba8.chunks_exact(4).map(|pixel| pixel[3] > 0).collect();
+    content.contains(&false).then_some(content)
 }
 
-/// Black pixels over voids of a DEM on the same grid are no content: otherwise they would darken the rim of what is there.
-fn mark_void_pixels(texture: &mut Texture, dem: &Dem, ortho_from_pixel: &Affine) {
-    if texture.size_px != dem.size || *ortho_from_pixel != dem.model_from_pixel {
-        return;
+fn with_name(path: &Path, notes: Vec<String>) -> Vec<String> {
+    notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect()
+}
+
+/// With what a file and those beside it say about its place.
+fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<String>), TerrainFileError> {
+    let failed = TerrainFileError::of_ortho;
+    if is_tiff(path).map_err(failed)? {
+        let mut raster = Raster::read(path).map_err(failed)?;
+        beside::read_tags(path, &mut raster.geo)?;
+        beside::read_mask(path, &mut raster).map_err(failed)?;
+        let (texture, notes) = raster.to_picture(path, Encoding::Srgb, spec.ortho_white).map_err(failed)?;
+        return Ok((texture, raster.geo, notes));
     }
-    for (index, pixel) in texture.rgba8.chunks_exact_mut(4).enumerate() {
-        if pixel[..3] == [0, 0, 0] && dem.height_m(dem.column_and_row(index)).is_nan() {
-            pixel[3] = 0;
+    if spec.ortho_white.is_some() {
+        return Err(failed(PictureError::decode(path, "scene.terrain.ortho_white is for TIFF files: leave it out")));
+    }
+    let (texture, orientation) = read_stored(path, Encoding::Srgb).map_err(failed)?;
+    let mut geo = GeoTags { orientation, ..GeoTags::default() };
+    beside::read_tags(path, &mut geo)?;
+    Ok((texture, geo, Vec::new()))
+}
+
+/// Neutral, and as bright as a card of 18 % looks: sRGB.
+pub(super) const GREY: u8 = 118;
+
+/// Colours of pixels without content. Over ground they are what lies beyond the picture is; where there is no ground they are those of their
+/// neighbours, which they would darken.
+fn finish(texture: &mut Texture, over_voids: Option<&[bool]>, beyond: Beyond) {
+    let light = |byte: u8| linear_from_srgb(f32::from(byte) / 255.0);
+    if beyond == Beyond::Grey {
+        for (index, pixel) in texture.rgba8.chunks_exact_mut(4).enumerate() {
+            if pixel[3] < 255 && over_voids.is_none_or(|voids| !voids[index]) {
+                let [share, grey] = [f32::from(pixel[3]) / 255.0, light(GREY)];
+                for byte in &mut pixel[..3] {
+                    *byte = (255.0 * srgb_from_linear(light(*byte) * share + grey * (1.0 - share))).round() as u8;
+                }
+                pixel[3] = 255;
+            }
         }
     }
+    if let Some(voids) = over_voids {
+        for (pixel, is_void) in texture.rgba8.chunks_exact_mut(4).zip(voids) {
+            if *is_void && pixel[..3] == [0, 0, 0] {
+                pixel[3] = 0;
+            }
+        }
+    }
+    texture.bleed_into_transparent();
+}
+
+/// Which pixels lie over voids of a DEM on the same grid: black there is no content, and would darken the rim of what is.
+fn over_voids(texture: &Texture, dem: &Dem, ortho_from_pixel: &Affine) -> Option<Vec<bool>> {
+    if texture.size_px != dem.size || *ortho_from_pixel != dem.model_from_pixel {
+        return None;
+    }
+    Some((0..dem.points() as usize).map(|index| dem.height_m(dem.column_and_row(index)).is_nan()).collect())
 }

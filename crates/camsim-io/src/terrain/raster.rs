@@ -1,270 +1,251 @@
-//! TIFF files as numbers, with what their tags say about place and meaning.
+//! Rasters as numbers and as pictures, with which of their pixels hold something.
 
-use std::{
-    fs::File,
-    io::{BufReader, Read},
-    path::Path,
-};
+use std::path::Path;
 
 use camsim_core::{
     scene::{Encoding, Texture},
     sequence::GrayImage,
 };
-use tiff::{
-    ColorType,
-    decoder::{ChunkType, Decoder, DecodingResult, Limits},
-    tags::Tag,
-};
+use rayon::prelude::*;
 
-use super::georeference::Affine;
+pub(crate) use super::tiff_file::{is_tiff, most_decoded};
+use super::{
+    bands::ColorBands,
+    geo_tags::GeoTags,
+    tiff_file::{Directory, Image, Sample, TiffFile, gdal_translate, tag},
+};
 use crate::pictures::PictureError;
 
-/// A decoded file may be this much larger than the file itself (the best that deflate can do is 1032).
-const MAX_COMPRESSION: u64 = 2000;
-
-/// Small files may always decode to this, bytes.
-const MIN_LIMIT: u64 = 64 << 20;
-
-/// What a file of so many bytes may decode to, bytes: a few bytes must not ask for all memory.
-pub(crate) fn most_decoded(bytes: u64) -> u64 {
-    bytes.saturating_mul(MAX_COMPRESSION).max(MIN_LIMIT)
-}
-
-/// A decoded TIFF.
+/// A decoded raster.
 pub(crate) struct Raster {
     pub size: [u32; 2],
     pub geo: GeoTags,
-    color: ColorType,
-    /// Samples a pixel.
-    bands: usize,
-    /// Whole bands one after the other, instead of pixel after pixel.
-    is_planar: bool,
-    data: DecodingResult,
+    pub image: Image,
+    /// Whether there is something at a pixel, where masks or blocks that are left out say so.
+    valid: Option<Vec<bool>>,
     /// 16-bit R, G, B planes of a palette.
-    palette: Option<Vec<u16>>,
+    palette: Option<Vec<u64>>,
 }
 
-/// What the tags say.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct GeoTags {
-    pub model_from_pixel: Option<Affine>,
-    pub epsg: Option<u16>,
-    pub nodata: Option<f64>,
-    /// EPSG codes of units.
-    pub horizontal_unit: Option<u16>,
-    pub vertical_unit: Option<u16>,
-}
-
-/// Whether a file begins as a TIFF does.
-pub(crate) fn is_tiff(path: &Path) -> Result<bool, PictureError> {
-    let mut start = [0; 4];
-    let mut file = File::open(path).map_err(|source| PictureError::open(path, source))?;
-    // A file of less than four bytes is no TIFF either.
-    let _ = file.read(&mut start).map_err(|source| PictureError::open(path, source))?;
-    Ok(matches!(start, [b'I', b'I', 42 | 43, 0] | [b'M', b'M', 0, 42 | 43]))
-}
+/// Bits of tag 254.
+const REDUCED: u64 = 1;
+const MASK: u64 = 4;
 
 impl Raster {
-    /// Reads the first image of a file.
+    /// Reads the first picture of a file, with its mask.
     pub fn read(path: &Path) -> Result<Self, PictureError> {
-        if !is_tiff(path)? {
-            return Err(PictureError::decode(path, "not a TIFF file"));
-        }
-        let file = File::open(path).map_err(|source| PictureError::open(path, source))?;
-        let bytes = file.metadata().map_err(|source| PictureError::open(path, source))?.len();
-        Self::decode(BufReader::new(file), bytes).map_err(|reason| PictureError::decode(path, reason))
+        let mut tiff = TiffFile::open(path)?;
+        Self::decode(&mut tiff).map_err(|reason| PictureError::decode(path, reason))
     }
 
-    fn decode(file: BufReader<File>, bytes: u64) -> Result<Self, String> {
-        let mut limits = Limits::default();
-        limits.decoding_buffer_size = usize::try_from(most_decoded(bytes)).unwrap_or(usize::MAX);
-        limits.intermediate_buffer_size = limits.decoding_buffer_size;
-        // A large image in strips of one row has large lists of offsets.
-        limits.ifd_value_size = 64 << 20;
-        let mut decoder = Decoder::new(file).map_err(say)?.with_limits(limits);
-        let (width, height) = decoder.dimensions().map_err(say)?;
-        let color = decoder.colortype().map_err(say)?;
-        if color.bit_depth() < 8 {
-            return Err(format!("{} bits a sample are not supported: convert to 8 or more", color.bit_depth()));
+    /// Of numbers that come from elsewhere.
+    pub fn of_numbers(image: Image, geo: GeoTags) -> Self {
+        Self { size: image.size, geo, image, valid: None, palette: None }
+    }
+
+    fn decode(tiff: &mut TiffFile) -> Result<Self, String> {
+        let directories = tiff.directories.clone();
+        let mut kinds = Vec::new();
+        for of in &directories {
+            kinds.push(tiff.integer(of, tag::NEW_SUBFILE_TYPE)?.unwrap_or(0));
         }
-        let geo = GeoTags::read(&mut decoder)?;
-        let find_u16s = |decoder: &mut Decoder<_>, tag| decoder.find_tag_unsigned_vec::<u16>(tag).map_err(say);
-        let palette = find_u16s(&mut decoder, Tag::ColorMap)?;
-        let samples = find_u16s(&mut decoder, Tag::SamplesPerPixel)?.and_then(|list| list.first().copied()).unwrap_or(1);
-        let is_planar = samples > 1 && find_u16s(&mut decoder, Tag::PlanarConfiguration)?.is_some_and(|list| list.first() == Some(&2));
-        if is_planar && decoder.get_chunk_type() == ChunkType::Tile {
-            // The decoder mixes up the tiles of the second and further bands.
-            return Err("tiles with separate bands are not supported: convert with `gdal_translate -co INTERLEAVE=PIXEL IN OUT`".into());
+        let first = kinds.iter().position(|kind| kind & (REDUCED | MASK) == 0).unwrap_or(0);
+        let of = &directories[first];
+        let mut geo = GeoTags::read(tiff, of)?;
+        let more = kinds.iter().filter(|kind| *kind & (REDUCED | MASK) == 0).count();
+        if more > 1 {
+            geo.notes.push(format!("holds {more} pictures, of which the first is used"));
         }
-        let mut data = DecodingResult::U8(Vec::new());
-        decoder.read_image_to_buffer(&mut data).map_err(say)?;
-        let pixels = width as usize * height as usize;
-        let length = length(&data);
-        if pixels == 0 || length == 0 || !length.is_multiple_of(pixels) {
-            return Err(format!("{length} samples do not make {width} x {height} pixels"));
+        let image = tiff.image(of)?;
+        let palette = tiff.integers(of, tag::COLOR_MAP)?;
+        let mut raster = Self { size: image.size, geo, image, valid: None, palette };
+        raster.leave_out_absent();
+        for (kind, of) in kinds.iter().zip(&directories) {
+            if kind & MASK != 0 && kind & REDUCED == 0 {
+                let mask = mask_of(tiff, of, raster.size)?;
+                raster.leave_out(&mask);
+            }
         }
-        Ok(Self { size: [width, height], geo, color, bands: length / pixels, is_planar, data, palette })
+        Ok(raster)
+    }
+
+    fn leave_out_absent(&mut self) {
+        let width = self.size[0] as usize;
+        if self.image.absent.is_empty() {
+            return;
+        }
+        let valid = self.valid.get_or_insert_with(|| vec![true; self.image.pixels()]);
+        for [x, y, columns, rows] in &self.image.absent {
+            for row in *y..y + rows {
+                let from = row as usize * width + *x as usize;
+                valid[from..from + *columns as usize].fill(false);
+            }
+        }
+    }
+
+    /// What a mask beside the file leaves out.
+    pub fn leave_out_by(&mut self, path: &Path) -> Result<(), PictureError> {
+        let mut tiff = TiffFile::open(path)?;
+        let of = tiff.directories[0].clone();
+        let mask = mask_of(&mut tiff, &of, self.size).map_err(|reason| PictureError::decode(path, reason))?;
+        self.leave_out(&mask);
+        Ok(())
+    }
+
+    fn leave_out(&mut self, mask: &[bool]) {
+        let valid = self.valid.get_or_insert_with(|| vec![true; mask.len()]);
+        valid.iter_mut().zip(mask).for_each(|(valid, mask)| *valid &= mask);
+    }
+
+    /// Whether masks have something to show at a pixel.
+    pub fn is_valid(&self, pixel: usize) -> bool {
+        self.valid.as_ref().is_none_or(|valid| valid[pixel])
     }
 
     /// Samples a pixel.
     pub fn bands(&self) -> usize {
-        self.bands
+        self.image.bands
     }
 
     /// Of a depth picture: whether it holds 16-bit whole numbers, or floats; `None` if neither, or of several bands.
     pub fn depth_is_whole(&self) -> Option<bool> {
-        match (&self.data, self.bands) {
-            (DecodingResult::U16(_), 1) => Some(true),
-            (DecodingResult::F16(_) | DecodingResult::F32(_) | DecodingResult::F64(_), 1) => Some(false),
+        match (self.image.sample, self.image.bands, self.image.bits) {
+            (Sample::U16, 1, 16) => Some(true),
+            (Sample::F16 | Sample::F32 | Sample::F64, 1, _) => Some(false),
             _ => None,
         }
     }
 
     /// A value of the first band.
     pub fn value(&self, pixel: usize) -> f64 {
-        let at = if self.is_planar { pixel } else { pixel * self.bands };
-        match &self.data {
-            DecodingResult::U8(v) => v[at].into(),
-            DecodingResult::U16(v) => v[at].into(),
-            DecodingResult::U32(v) => v[at].into(),
-            DecodingResult::U64(v) => v[at] as f64,
-            DecodingResult::F16(v) => v[at].to_f64(),
-            DecodingResult::F32(v) => v[at].into(),
-            DecodingResult::F64(v) => v[at],
-            DecodingResult::I8(v) => v[at].into(),
-            DecodingResult::I16(v) => v[at].into(),
-            DecodingResult::I32(v) => v[at].into(),
-            DecodingResult::I64(v) => v[at] as f64,
-        }
+        self.image.value(pixel, 0)
     }
 
-    /// As a colour picture. Pixels whose colours all equal the "no data" mark become transparent.
+    /// As a colour picture; white is the largest number that its bits can hold.
     pub fn to_texture(&self, path: &Path, encoding: Encoding) -> Result<Texture, PictureError> {
-        let sample = self.byte_sampler().map_err(|reason| PictureError::decode(path, reason))?;
-        let nodata = self.geo.nodata.filter(|mark| mark.fract() == 0.0 && (0.0..=255.0).contains(mark)).map(|mark| mark as u8);
-        let mut rgba8 = Vec::with_capacity(4 * self.pixels());
-        for pixel in 0..self.pixels() {
-            let at = |band: usize| sample(pixel, band);
-            let [r, g, b, a] = match self.color {
-                ColorType::Palette(_) => self.palette_color(at(0)),
-                ColorType::GrayA(_) if self.bands >= 2 => [at(0), at(0), at(0), at(1)],
-                ColorType::RGBA(_) if self.bands >= 4 => [at(0), at(1), at(2), at(3)],
-                ColorType::CMYK(_) | ColorType::CMYKA(_) | ColorType::Lab(_) | ColorType::YCbCr(_) => {
-                    return Err(PictureError::decode(path, format!("{:?} colours are not supported: convert to RGB", self.color)));
-                }
-                _ if self.bands >= 3 => [at(0), at(1), at(2), 255],
-                _ => [at(0), at(0), at(0), 255],
-            };
-            let is_void = nodata.is_some_and(|mark| [r, g, b] == [mark; 3]);
-            rgba8.extend([r, g, b, if is_void { 0 } else { a }]);
+        self.to_picture(path, encoding, None).map(|(texture, _)| texture)
+    }
+
+    /// As a colour picture, with what there is to say about it. `white` is the stored number that is full light. Pixels without content are transparent:
+    /// those of the "no data" mark, of masks, and of blocks that are left out.
+    pub fn to_picture(&self, path: &Path, encoding: Encoding, white: Option<f64>) -> Result<(Texture, Vec<String>), PictureError> {
+        let wrong = |reason: String| PictureError::decode(path, reason);
+        let image = &self.image;
+        if !matches!(image.sample, Sample::U8 | Sample::U16) {
+            return Err(wrong(format!(
+                "colours must be of at most 16 bits, unsigned: convert it with `{}`",
+                gdal_translate("-ot Byte -scale", path)
+            )));
         }
-        Ok(Texture { size_px: self.size, rgba8, encoding })
+        let bands = ColorBands::of(image, &self.geo.bands, self.palette.is_some())
+            .map_err(|reason| wrong(format!("{reason}: convert it with `{}`", gdal_translate("-expand rgb -co PHOTOMETRIC=RGB", path))))?;
+        let mut notes = bands.notes.clone();
+        let most = f64::from((1_u32 << image.bits) - 1);
+        notes.extend(self.say_scale(&bands, white, most));
+        let (to_byte, white) = (255.0 / white.unwrap_or(most), white.unwrap_or(most));
+        let byte = |pixel: usize, band: usize| (f64::from(image.unsigned(pixel, band)) * to_byte).round().min(255.0) as u8;
+        let mark = self.geo.nodata.filter(|mark| mark.fract() == 0.0 && (0.0..=most).contains(mark)).map(|mark| mark as u32);
+        let color = |pixel: usize| -> [u8; 4] {
+            let mut rgb = match (&self.palette, bands.is_palette) {
+                (Some(palette), true) => palette_color(palette, image.unsigned(pixel, bands.rgb[0])),
+                _ => bands.rgb.map(|band| byte(pixel, band)),
+            };
+            if bands.is_inverted {
+                rgb = rgb.map(|byte| 255 - byte);
+            }
+            let is_void =
+                mark.is_some_and(|mark| bands.rgb.iter().all(|&band| image.unsigned(pixel, band) == mark)) || !self.is_valid(pixel);
+            let alpha = match bands.alpha {
+                _ if is_void => 0,
+                None => 255,
+                Some(band) if bands.alpha_is_full_scale => (f64::from(image.unsigned(pixel, band)) * 255.0 / most).round() as u8,
+                Some(band) => (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8,
+            };
+            if bands.is_premultiplied && alpha > 0 {
+                rgb = rgb.map(|byte| (u32::from(byte) * 255 / u32::from(alpha)).min(255) as u8);
+            }
+            [rgb[0], rgb[1], rgb[2], alpha]
+        };
+        let mut rgba8 = vec![0; 4 * image.pixels()];
+        let width = self.size[0] as usize;
+        rgba8.par_chunks_mut(4 * width).enumerate().for_each(|(row, bytes)| {
+            for (column, bytes) in bytes.chunks_exact_mut(4).enumerate() {
+                bytes.copy_from_slice(&color(row * width + column));
+            }
+        });
+        Ok((Texture { size_px: self.size, rgba8, encoding }, notes))
+    }
+
+    /// Where the largest stored number is far from what is taken for white.
+    fn say_scale(&self, bands: &ColorBands, white: Option<f64>, most: f64) -> Option<String> {
+        let image = &self.image;
+        if bands.is_palette || (image.bits <= 8 && white.is_none()) {
+            return None;
+        }
+        let mark = self.geo.nodata;
+        let largest_of = |pixel: usize| {
+            let stored = bands.rgb.iter().map(|&band| image.unsigned(pixel, band));
+            let is_void = !self.is_valid(pixel) || stored.clone().all(|value| mark == Some(f64::from(value)));
+            if is_void { 0 } else { stored.max().unwrap_or(0) }
+        };
+        let largest = (0..image.pixels()).into_par_iter().map(largest_of).max().unwrap_or(0);
+        match white {
+            Some(white) => {
+                let cut = (0..image.pixels()).into_par_iter().filter(|&pixel| f64::from(largest_of(pixel)) > white).count();
+                (cut > 0).then(|| {
+                    let share = 100.0 * cut as f64 / image.pixels() as f64;
+                    format!("{share:.1} % of its pixels are brighter than scene.terrain.ortho_white = {white}, and are cut there; the largest value is {largest}")
+                })
+            }
+            None if largest > 0 && 4.0 * f64::from(largest) <= most => {
+                let bits = u32::BITS - largest.leading_zeros();
+                let full = (1_u64 << bits) - 1;
+                Some(format!(
+                    "its values of {} bits end at {largest} of {most}, as those of {bits} bits do: with white at {most} the picture is nearly black. \
+                     Set scene.terrain.ortho_white = {full} if that is white, or = {most} if it is to be as dark as this",
+                    image.bits
+                ))
+            }
+            None => None,
+        }
     }
 
     /// As a grey picture of values 0..=1: integers by their full range, floats as they are (cut to the range).
     pub fn to_gray(&self, path: &Path) -> Result<GrayImage, PictureError> {
-        if self.bands == 1 && !matches!(self.color, ColorType::Palette(_)) {
-            let scale = match &self.data {
-                DecodingResult::U8(_) => 255.0,
-                DecodingResult::U16(_) => 65535.0,
-                DecodingResult::F16(_) | DecodingResult::F32(_) | DecodingResult::F64(_) => 1.0,
-                _ => return Err(PictureError::decode(path, "grey values must be 8 or 16 bit unsigned, or float")),
-            };
-            let values: Vec<f32> = (0..self.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
+        let image = &self.image;
+        let is_float = matches!(image.sample, Sample::F16 | Sample::F32 | Sample::F64);
+        if image.bands == 1 && image.photometric == 1 && (is_float || matches!(image.sample, Sample::U8 | Sample::U16)) {
+            let scale = if is_float { 1.0 } else { f64::from((1_u32 << image.bits) - 1) };
+            let values: Vec<f32> = (0..image.pixels()).map(|pixel| (self.value(pixel) / scale).clamp(0.0, 1.0) as f32).collect();
             if values.iter().any(|v| v.is_nan()) {
                 return Err(PictureError::decode(path, "holds NaN"));
             }
             return Ok(GrayImage { size_px: self.size, values });
         }
+        if !matches!(image.sample, Sample::U8 | Sample::U16) {
+            return Err(PictureError::decode(path, "grey values must be of at most 16 bits, unsigned, or floats"));
+        }
         Ok(crate::pictures::gray_from_texture(&self.to_texture(path, Encoding::Linear)?))
     }
-
-    fn pixels(&self) -> usize {
-        self.size[0] as usize * self.size[1] as usize
-    }
-
-    fn palette_color(&self, index: u8) -> [u8; 4] {
-        let Some(palette) = &self.palette else { return [index, index, index, 255] };
-        let entries = palette.len() / 3;
-        let channel = |k: usize| palette.get(k * entries + index as usize).map_or(0, |v| (v >> 8) as u8);
-        [channel(0), channel(1), channel(2), 255]
-    }
-
-    /// (pixel, band) -> byte.
-    fn byte_sampler(&self) -> Result<Box<dyn Fn(usize, usize) -> u8 + '_>, String> {
-        let (bands, pixels, is_planar) = (self.bands, self.pixels(), self.is_planar);
-        let index = move |pixel: usize, band: usize| if is_planar { band * pixels + pixel } else { pixel * bands + band };
-        match &self.data {
-            DecodingResult::U8(v) => Ok(Box::new(move |pixel, band| v[index(pixel, band)])),
-            // 65535 / 257 = 255.
-            DecodingResult::U16(v) => Ok(Box::new(move |pixel, band| ((u32::from(v[index(pixel, band)]) + 128) / 257) as u8)),
-            _ => Err("colours must be 8 or 16 bit unsigned: convert with `gdal_translate -ot Byte -scale IN OUT`".into()),
-        }
-    }
 }
 
-impl GeoTags {
-    fn read(decoder: &mut Decoder<BufReader<File>>) -> Result<Self, String> {
-        let mut numbers = |tag: Tag| match decoder.find_tag(tag) {
-            Ok(Some(value)) => value.into_f64_vec().map(Some).map_err(say),
-            Ok(None) => Ok(None),
-            Err(error) => Err(say(error)),
-        };
-        let scale = numbers(Tag::ModelPixelScaleTag)?;
-        let tie = numbers(Tag::ModelTiepointTag)?;
-        let matrix = numbers(Tag::ModelTransformationTag)?;
-        let keys = decoder.find_tag_unsigned_vec::<u16>(Tag::GeoKeyDirectoryTag).map_err(say)?.unwrap_or_default();
-        let nodata = match decoder.find_tag(Tag::GdalNodata) {
-            Ok(Some(value)) => value.into_string().ok().and_then(|text| text.trim_matches(['\0', ' ']).parse().ok()),
-            _ => None,
-        };
-        // Entries: key, place (0 = here), count, value.
-        let key = |wanted: u16| {
-            keys.get(4..)?.chunks_exact(4).find(|entry| entry[0] == wanted && entry[1] == 0).map(|entry| entry[3]).filter(|&code| code != 0)
-        };
-        let raster_type = key(1025);
-        let affine = affine(scale.as_deref(), tie.as_deref(), matrix.as_deref());
-        Ok(Self {
-            // 2: whole pixel coordinates are pixel centres ("pixel is point").
-            model_from_pixel: if raster_type == Some(2) { affine.map(Affine::with_centres_at_half) } else { affine },
-            // 3072: projected; 2048: geographic, which a projected file may state too, as its base.
-            epsg: key(3072).or_else(|| key(2048)),
-            nodata,
-            horizontal_unit: key(3076),
-            vertical_unit: key(4099),
-        })
+/// Where a mask's picture is not zero, in any band.
+fn mask_of(tiff: &mut TiffFile, of: &Directory, size: [u32; 2]) -> Result<Vec<bool>, String> {
+    let mask = tiff.image(of)?;
+    if mask.size != size {
+        return Err(format!("its mask has {:?} pixels, and the picture {size:?}", mask.size));
     }
+    let mut valid: Vec<bool> = (0..mask.pixels()).map(|pixel| (0..mask.bands).any(|band| mask.value(pixel, band) != 0.0)).collect();
+    // What a mask leaves out, it does not show.
+    for [x, y, columns, rows] in &mask.absent {
+        (*y..y + rows).for_each(|row| valid[(row * size[0] + x) as usize..(row * size[0] + x + columns) as usize].fill(false));
+    }
+    Ok(valid)
 }
 
-fn affine(scale: Option<&[f64]>, tie: Option<&[f64]>, matrix: Option<&[f64]>) -> Option<Affine> {
-    if let Some([a, b, _, c, d, e, _, f, ..]) = matrix {
-        return Some(Affine { origin: [*c, *f], column: [*a, *d], row: [*b, *e] });
-    }
-    let ([sx, sy, ..], [i, j, _, x, y, ..]) = (scale?, tie?) else { return None };
-    // Rows go south: the scale is positive by convention.
-    Some(Affine { origin: [x - i * sx, y + j * sy], column: [*sx, 0.0], row: [0.0, -sy] })
-}
-
-fn say(error: tiff::TiffError) -> String {
-    match error {
-        tiff::TiffError::IoError(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => "the file is cut off".into(),
-        tiff::TiffError::LimitsExceeded => "the stated size is impossible for a file of this length".into(),
-        other => other.to_string(),
-    }
-}
-
-fn length(data: &DecodingResult) -> usize {
-    match data {
-        DecodingResult::U8(v) => v.len(),
-        DecodingResult::U16(v) => v.len(),
-        DecodingResult::U32(v) => v.len(),
-        DecodingResult::U64(v) => v.len(),
-        DecodingResult::F16(v) => v.len(),
-        DecodingResult::F32(v) => v.len(),
-        DecodingResult::F64(v) => v.len(),
-        DecodingResult::I8(v) => v.len(),
-        DecodingResult::I16(v) => v.len(),
-        DecodingResult::I32(v) => v.len(),
-        DecodingResult::I64(v) => v.len(),
-    }
+fn palette_color(palette: &[u64], index: u32) -> [u8; 3] {
+    let entries = palette.len() / 3;
+    // Some writers fill bytes where words are meant.
+    let is_of_bytes = palette.iter().all(|value| *value < 256);
+    [0, 1, 2].map(|k| palette.get(k * entries + index as usize).map_or(0, |v| if is_of_bytes { *v as u8 } else { (v >> 8) as u8 }))
 }

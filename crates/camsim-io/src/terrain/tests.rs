@@ -35,7 +35,7 @@ fn frame(origin_deg: [f64; 2], height_m: f64) -> impl Fn(f64, f64, f64) -> DVec3
 }
 
 fn spec(dem: &Path, ortho: Option<&Path>) -> TerrainSpec {
-    TerrainSpec { dem: dem.into(), ortho: ortho.map(Into::into), height: Default::default(), epsg: None }
+    TerrainSpec { dem: dem.into(), ortho: ortho.map(Into::into), ..TerrainSpec::default() }
 }
 
 /// Tags of a small GeoTIFF.
@@ -161,8 +161,8 @@ fn files_that_are_no_terrain_are_named() {
     write_dem(&path, [2, 2], &[0.0; 4], None);
     fails(None, "no georeference");
     fails(Some(32632), "no georeference");
-    write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { epsg: Some(2154), ..UTM }));
-    fails(None, "EPSG:2154 is not supported");
+    write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { epsg: Some(27573), ..UTM }));
+    fails(None, "EPSG:27573 is not supported");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&UTM));
     fails(Some(32633), "states EPSG:32632 but scene.terrain.epsg = 32633");
     write_dem(&path, [2, 2], &[0.0; 4], Some(&Tags { scale: [0.0; 3], ..UTM }));
@@ -183,7 +183,8 @@ fn an_ortho_lies_where_its_georeference_says() {
     assert_eq!((loaded.terrain.vertices[0].uv, loaded.summary.outside_ortho), ([0.125, 1.0 / 6.0], 0));
     // 5 m pixels that begin 10 m further west and north.
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 499992.5 5000007.5").unwrap();
-    let loaded = read_terrain(&spec(&dem, Some(&ortho)), &ned, None).unwrap();
+    let as_its_edge = TerrainSpec { beyond: Beyond::Edge, ..spec(&dem, Some(&ortho)) };
+    let loaded = read_terrain(&as_its_edge, &ned, None).unwrap();
     assert_eq!(loaded.terrain.vertices[0].uv, [15.0 / 40.0, 0.5]);
     assert_eq!(loaded.summary.outside_ortho, 6);
     fs::write(folder.path().join("ortho.pgw"), "5 0 0 -5 599992.5 5000007.5").unwrap();

@@ -32,8 +32,7 @@ fn load(setup: &Setup<'_>) -> Result<(Arc<Sequence>, &'static str), ReproduceErr
             let terrain = TerrainSpec {
                 dem: data.join("terrain/sertig/sertig_valley.tif"),
                 ortho: Some(data.join("terrain/sertig/sertig_valley_color.tif")),
-                height: Default::default(),
-                epsg: None,
+                ..TerrainSpec::default()
             };
             let own = rig::scenario(camera);
             let scenario = Scenario {

@@ -24,6 +24,9 @@ pub(super) fn check_scene(check: &mut Check, scene: &SceneSpec) {
         let twice = model.placements.is_some() && (model.at != PatternCentre::Origin || model.geodetic.is_some());
         check.require(!twice, format!("{table}.placements"), || "takes the place of at and geodetic: leave those out".into());
     }
+    if let Some(white) = scene.terrain.as_ref().and_then(|terrain| terrain.ortho_white) {
+        check.positive("scene.terrain.ortho_white", white, "give the stored number that is white, 2047 for 11 bits");
+    }
     if let Some(board) = &scene.board {
         check_board(check, board);
     }

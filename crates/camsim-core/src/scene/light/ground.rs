@@ -28,6 +28,12 @@ impl Terrain {
         let times = ground.times(self.texture.size_px);
         let mut texture = if times > 1 { finer(&self.texture, times) } else { Texture::clone(&self.texture) };
         ground.paint(&mut texture);
+        // Ground beyond the picture is lit as level ground is.
+        if let Some(beyond) = &mut self.beyond {
+            let bytes = Bytes::new(texture.encoding);
+            beyond[..3].iter_mut().for_each(|byte| *byte = bytes.times(*byte, ground.level));
+            texture.frame(*beyond);
+        }
         self.texture = Arc::new(texture);
         times
     }

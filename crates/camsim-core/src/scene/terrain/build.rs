@@ -149,6 +149,7 @@ impl Terrain {
             horizontal_m: Default::default(),
             void_cells: 0,
             texture,
+            beyond: None,
             quantum_m,
             bounds: Aabb::EMPTY,
             tree: BlockTree::new([1, 1], &[Aabb::EMPTY]),

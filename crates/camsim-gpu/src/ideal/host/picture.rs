@@ -45,17 +45,17 @@ pub(super) fn is_read(texture: &Texture, wrap: [Wrap; 2], nearest: bool) -> bool
 }
 
 impl Picture {
-    /// Of a picture that [is read](is_read).
-    pub fn new(texture: &Texture, wrap: [Wrap; 2]) -> Self {
+    /// Of a picture that [is read](is_read), with a border around its smaller versions if there is one.
+    pub fn new(texture: &Texture, wrap: [Wrap; 2], border: Option<[u8; 4]>) -> Self {
         match texture.size_px {
             [1, 1] => Self::Uniform(texture.linear_at([0, 0])),
-            _ => Self::Texels(Box::new(Texels::new(texture, wrap.map(|wrap| wrap == Wrap::Repeat)))),
+            _ => Self::Texels(Box::new(Texels::new(texture, wrap.map(|wrap| wrap == Wrap::Repeat), border))),
         }
     }
 }
 
 impl Texels {
-    fn new(texture: &Texture, repeats: [bool; 2]) -> Self {
+    fn new(texture: &Texture, repeats: [bool; 2], border: Option<[u8; 4]>) -> Self {
         let mut texels = Self {
             halves: Large::default(),
             begins: [0; MOST_VERSIONS],
@@ -65,7 +65,7 @@ impl Texels {
             last: 0.0,
             repeats,
         };
-        let mips = texture.mips(TexelForm::Light);
+        let mips = texture.mips_within(TexelForm::Light, border);
         let sizes = [texture.size_px].into_iter().chain(mips.iter().map(|mip| mip.size_px));
         texels.halves.fit(sizes.map(halves_of).sum());
         let mut end = texels.add(0, 0, &texture.texels(&texture.rgba8, TexelForm::Light), texture.size_px);

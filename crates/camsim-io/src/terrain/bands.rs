@@ -1,0 +1,93 @@
+//! Which bands of a picture are its colours.
+
+use super::{metadata::BandMeaning, tiff_file::Image};
+
+/// Tag 262 and what becomes of it.
+pub(crate) const PHOTOMETRICS: &[(u64, &str, &str)] = &[
+    (0, "grey, 0 is white", "applied to pictures; heights are as they are stored"),
+    (1, "grey, 0 is black", "applied"),
+    (2, "RGB", "applied"),
+    (3, "palette", "applied"),
+    (4, "mask", "applied, in a directory of its own"),
+    (5, "CMYK", "refused, with the command that converts"),
+    (6, "YCbCr", "applied in JPEG, else refused"),
+    (8, "CIELab", "refused, with the command that converts"),
+];
+
+/// Tag 338: alpha that colours are multiplied by, and alpha that they are not.
+const ASSOCIATED: u64 = 1;
+const UNASSOCIATED: u64 = 2;
+
+#[derive(Debug, PartialEq)]
+pub(super) struct ColorBands {
+    /// Red, green, blue; three times the same of grey.
+    pub rgb: [usize; 3],
+    pub alpha: Option<usize>,
+    pub is_premultiplied: bool,
+    /// Whether alpha is known to use all of its bits.
+    pub alpha_is_full_scale: bool,
+    pub is_palette: bool,
+    pub is_inverted: bool,
+    pub notes: Vec<String>,
+}
+
+impl ColorBands {
+    pub fn of(image: &Image, meanings: &[BandMeaning], has_palette: bool) -> Result<Self, String> {
+        let mut notes = Vec::new();
+        let named = |name: &str| {
+            meanings
+                .iter()
+                .position(|band| band.color.as_deref().is_some_and(|color| color.eq_ignore_ascii_case(name)))
+                .filter(|band| *band < image.bands)
+        };
+        let extra =
+            |kind: u64| image.extra.iter().position(|extra| *extra == kind).and_then(|k| (image.bands + k).checked_sub(image.extra.len()));
+        let alpha = named("Alpha").or_else(|| extra(UNASSOCIATED)).or_else(|| extra(ASSOCIATED));
+        let is_premultiplied = alpha.is_some() && alpha == extra(ASSOCIATED);
+        let rgb = match [named("Red"), named("Green"), named("Blue")] {
+            [Some(red), Some(green), Some(blue)] => [red, green, blue],
+            _ => match image.photometric {
+                0 | 1 | 3 | 4 if image.bands < 3 || image.photometric == 3 => [0; 3],
+                2 if image.bands >= 3 => [0, 1, 2],
+                0 | 1 if image.bands - usize::from(alpha.is_some()) >= 3 => {
+                    notes.push(
+                        "does not say which of its bands are red, green and blue: the first three are taken; to choose, `gdal_translate -b RED -b GREEN -b BLUE -co PHOTOMETRIC=RGB IN OUT`"
+                            .to_owned(),
+                    );
+                    [0, 1, 2]
+                }
+                0 | 1 => [0; 3],
+                5 => return Err("CMYK colours are not read".into()),
+                8..=10 => return Err("CIELab colours are not read".into()),
+                2 => return Err(format!("RGB colours of {} bands are none", image.bands)),
+                other => return Err(format!("colours of photometric interpretation {other} are not read")),
+            },
+        };
+        let used = |band: usize| rgb.contains(&band) || alpha == Some(band);
+        let left: Vec<String> = (0..image.bands).filter(|&band| !used(band)).map(|band| (band + 1).to_string()).collect();
+        if !left.is_empty() {
+            notes.push(format!("its bands {} are neither colours nor alpha, and are left out", left.join(", ")));
+        }
+        if let Some(band) = meanings
+            .iter()
+            .take(image.bands)
+            .find(|band| band.scale.is_some_and(|scale| scale != 1.0) || band.offset.is_some_and(|offset| offset != 0.0))
+        {
+            notes.push(format!(
+                "a band's scale {} and offset {} (GDAL_METADATA) are not applied to colours",
+                band.scale.unwrap_or(1.0),
+                band.offset.unwrap_or(0.0)
+            ));
+        }
+        let is_palette = has_palette && image.photometric == 3;
+        Ok(Self {
+            rgb,
+            alpha,
+            is_premultiplied,
+            alpha_is_full_scale: image.bits == 8,
+            is_palette,
+            is_inverted: image.photometric == 0,
+            notes,
+        })
+    }
+}

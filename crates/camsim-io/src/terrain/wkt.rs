@@ -1,0 +1,140 @@
+//! Coordinate systems as well-known text: which EPSG code they are.
+//!
+//! By the code that the text itself states, or by the names that ESRI gives, which state none. A definition without either is not compared number
+//! by number: two that look alike may be two datums.
+
+use super::crs::SYSTEMS;
+
+/// Codes of the horizontal and the vertical part.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Codes {
+    pub horizontal: Option<u16>,
+    pub vertical: Option<u16>,
+}
+
+/// Names of ESRI's for systems that EPSG calls otherwise, with ` ` for `_`.
+const ESRI: &[(&str, u16)] = &[
+    ("GCS WGS 1984", 4326),
+    ("GCS ETRS 1989", 4258),
+    ("GCS North American 1983", 4269),
+    ("WGS 1984 Web Mercator Auxiliary Sphere", 3857),
+    ("CH1903 LV03", 21781),
+    ("CH1903+ LV95", 2056),
+    ("RGF 1993 Lambert 93", 2154),
+    ("British National Grid", 27700),
+    ("ETRS 1989 LAEA", 3035),
+    ("RD New", 28992),
+    ("Belge Lambert 1972", 31370),
+    ("NZGD 2000 New Zealand Transverse Mercator", 2193),
+];
+
+pub(super) fn codes(text: &str) -> Codes {
+    let text = text.trim().trim_start_matches('\u{feff}');
+    let parts = children(text);
+    let is_compound = ["COMPD_CS", "COMPOUNDCRS"].iter().any(|word| text.starts_with(word));
+    if is_compound {
+        let vertical = parts.iter().find(|part| ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word)));
+        let horizontal = parts.iter().find(|part| part.starts_with("PROJ") || part.starts_with("GEO"));
+        return Codes { horizontal: horizontal.and_then(|part| code(part)), vertical: vertical.and_then(|part| stated(part)) };
+    }
+    Codes { horizontal: code(text), vertical: None }
+}
+
+/// What a text is called: its first quoted word.
+pub(super) fn name(text: &str) -> &str {
+    text.split('"').nth(1).unwrap_or("no name")
+}
+
+fn code(text: &str) -> Option<u16> {
+    stated(text).or_else(|| by_name(name(text)))
+}
+
+/// `AUTHORITY["EPSG","N"]` or `ID["EPSG",N]` of the text itself, not of its parts.
+fn stated(text: &str) -> Option<u16> {
+    let own = children(text).into_iter().find(|part| part.starts_with("AUTHORITY") || part.starts_with("ID["))?;
+    if !own.contains("\"EPSG\"") {
+        return None;
+    }
+    own.split(',').nth(1)?.trim_matches(['"', ' ', ']']).parse().ok()
+}
+
+fn by_name(name: &str) -> Option<u16> {
+    let name = name.replace('_', " ");
+    for (start, north, south) in
+        [("WGS 1984 UTM Zone ", 32600, Some(32700)), ("ETRS 1989 UTM Zone ", 25800, None), ("NAD 1983 UTM Zone ", 26900, None)]
+    {
+        let Some(zone) = name.strip_prefix(start) else { continue };
+        let base = if zone.ends_with('S') { south? } else { north };
+        let zone: u16 = zone.trim_end_matches(['N', 'S']).parse().ok().filter(|zone| (1..=60).contains(zone))?;
+        return Some(base + zone);
+    }
+    if let Some(zone) = name.strip_prefix("GDA 1994 MGA Zone ") {
+        return zone.parse::<u16>().ok().map(|zone| 28300 + zone);
+    }
+    if let Some((_, code)) = ESRI.iter().find(|(known, _)| *known == name) {
+        return Some(*code);
+    }
+    let by_rule = |start: &str, base: u16, end: char| {
+        let zone = name.strip_prefix(start)?.strip_suffix(end)?;
+        zone.parse::<u16>().ok().filter(|zone| (1..=60).contains(zone)).map(|zone| base + zone)
+    };
+    // As the registry itself calls them.
+    by_rule("WGS 84 / UTM zone ", 32600, 'N').or_else(|| by_rule("WGS 84 / UTM zone ", 32700, 'S')).or_else(|| {
+        SYSTEMS.lines().find_map(|line| {
+            let mut words = line.split(';');
+            let (kind, code, known) = (words.next()?, words.next()?, words.next()?);
+            (matches!(kind, "projected" | "geographic") && known == name).then(|| code.parse().ok())?
+        })
+    })
+}
+
+/// The parts between a text's outermost brackets.
+fn children(text: &str) -> Vec<&str> {
+    let Some(open) = text.find(['[', '(']) else { return Vec::new() };
+    let (mut depth, mut quoted, mut from, mut parts) = (0, false, open + 1, Vec::new());
+    for (at, c) in text.char_indices().skip_while(|(at, _)| *at < open) {
+        match c {
+            '"' => quoted = !quoted,
+            _ if quoted => {}
+            '[' | '(' => depth += 1,
+            ']' | ')' => {
+                depth -= 1;
+                if depth == 0 {
+                    parts.push(text[from..at].trim());
+                    break;
+                }
+            }
+            ',' if depth == 1 => {
+                parts.push(text[from..at].trim());
+                from = at + 1;
+            }
+            _ => {}
+        }
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UTM: &str = r#"PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],AUTHORITY["EPSG","4326"]],UNIT["metre",1],AUTHORITY["EPSG","32632"]]"#;
+
+    #[test]
+    fn codes_are_those_of_the_whole() {
+        let found = |text: &str| codes(text).horizontal;
+        assert_eq!(found(UTM), Some(32632));
+        // Without its own code it is not its base's; its name is known.
+        assert_eq!(found(&UTM.replace(r#","32632"]"#, r#"x"]"#)), Some(32632));
+        assert_eq!(found(&UTM.replace(r#","32632"]"#, r#"x"]"#).replace("zone 32N", "of mine")), None);
+        assert_eq!(found(r#"PROJCS["WGS_1984_UTM_Zone_33S",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]]"#), Some(32733));
+        assert_eq!(found(r#"PROJCS["ETRS_1989_UTM_Zone_32N",GEOGCS["GCS_ETRS_1989",DATUM["D"]]]"#), Some(25832));
+        assert_eq!(found(r#"GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984"]]"#), Some(4326));
+        assert_eq!(found(r#"PROJCRS["RGF93 v1 / Lambert-93",BASEGEOGCRS["RGF93 v1"],ID["EPSG",2154]]"#), Some(2154));
+        assert_eq!(found("Projection UTM\nZone 32"), None);
+        assert_eq!(found("PROJCS[\"a\"[[["), None);
+        let both =
+            format!(r#"COMPD_CS["both",{UTM},VERT_CS["EGM96 height",UNIT["metre",1],AUTHORITY["EPSG","5773"]],AUTHORITY["EPSG","9999"]]"#);
+        assert_eq!(codes(&both), Codes { horizontal: Some(32632), vertical: Some(5773) });
+    }
+}

@@ -1,0 +1,243 @@
+//! Terrain from the field: heights and colours at known places. In all of tests/data/field the true height at the centre of pixel (column, row) is
+//! 400 + 0.7 column + 0.3 row metres, and the true colour (40 + 2 column, 30 + 2 row, 100).
+
+#![allow(clippy::unwrap_used)]
+
+use std::path::{Path, PathBuf};
+
+use camsim_core::{
+    scenario::{Beyond, HeightReference, HeightUnit, TerrainSpec},
+    scene::TexelForm,
+};
+use camsim_io::terrain::{LoadedTerrain, TerrainFileError, read_terrain};
+use glam::DVec3;
+
+fn field(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/field").join(name)
+}
+
+fn spec(dem: &str) -> TerrainSpec {
+    TerrainSpec { dem: field(dem), ..TerrainSpec::default() }
+}
+
+fn with_ortho(ortho: &str) -> TerrainSpec {
+    TerrainSpec { ortho: Some(field(ortho)), ..spec("ortho/dem.tif") }
+}
+
+/// A frame in which down is just the height turned over, near 47 N, 9 E.
+fn read(spec: &TerrainSpec) -> Result<LoadedTerrain, TerrainFileError> {
+    let ned = |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.82) * 6.37e6, (lon - 0.157) * 6.37e6, -height);
+    read_terrain(spec, &ned, None)
+}
+
+/// Metres above the datum at the centre of a pixel; `None` for a void.
+fn height_m(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> Option<f64> {
+    let terrain = &loaded.terrain;
+    let chunk = |at: u32, cells: u32| at.min(cells - 1) / 64;
+    let [x, y] = [chunk(column, terrain.cells[0]), chunk(row, terrain.cells[1])];
+    let down = terrain.position_ned_m(y * terrain.chunk_grid[0] + x, column - 64 * x, row - 64 * y).z;
+    (!down.is_nan()).then_some(-down)
+}
+
+/// Every height is the true one, but for those of a rectangle of pixels, which are missing.
+fn assert_heights(loaded: &LoadedTerrain, is_void: impl Fn(u32, u32) -> bool) {
+    assert_eq!(loaded.summary.size, [96, 96]);
+    for (column, row) in (0..96).flat_map(|row| (0..96).map(move |column| (column, row))) {
+        let expected = (!is_void(column, row)).then(|| 400.0 + 0.7 * f64::from(column) + 0.3 * f64::from(row));
+        let found = height_m(loaded, [column, row]);
+        let near = match (found, expected) {
+            (Some(found), Some(expected)) => (found - expected).abs() < 1e-3,
+            (found, expected) => found == expected,
+        };
+        assert!(near, "({column}, {row}): {found:?} {expected:?}");
+    }
+}
+
+fn color(loaded: &LoadedTerrain, [column, row]: [u32; 2]) -> [u8; 3] {
+    let texture = &loaded.terrain.texture;
+    let at = 4 * (row * texture.size_px[0] + column) as usize;
+    [0, 1, 2].map(|k| texture.rgba8[at + k])
+}
+
+/// Every colour is the true one, within `most` of 255.
+fn assert_colors(loaded: &LoadedTerrain, columns: std::ops::Range<u32>, most: u8) {
+    assert_eq!(loaded.terrain.texture.size_px, [96, 96]);
+    for (column, row) in (0..96).flat_map(|row| columns.clone().map(move |column| (column, row))) {
+        let (found, expected) = (color(loaded, [column, row]), [40 + 2 * column as u8, 30 + 2 * row as u8, 100]);
+        assert!((0..3).all(|k| found[k].abs_diff(expected[k]) <= most), "({column}, {row}): {found:?} {expected:?}");
+    }
+}
+
+fn never(_: u32, _: u32) -> bool {
+    false
+}
+
+#[test]
+fn scale_offset_and_unit_of_heights_are_applied() {
+    for name in ["scaleoff", "unit_ft", "unit_usft"] {
+        let loaded = read(&spec(&format!("dem-scale-unit/d_{name}.tif"))).unwrap();
+        assert_heights(&loaded, never);
+        assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+    }
+}
+
+#[test]
+fn a_vertical_system_gives_the_unit_and_warns_where_it_contradicts() {
+    for (name, says) in [("comp_6360", "EPSG:6360, NAVD88 height (ftUS)"), ("egm96", "EPSG:5773, EGM96 height")] {
+        let path = format!("dem-scale-unit/d_{name}.tif");
+        let loaded = read(&spec(&path)).unwrap();
+        assert_heights(&loaded, never);
+        let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+        assert!(note.contains(says) && note.contains("scene.terrain.height = \"msl\""), "{note}");
+        // Which is what it asks for.
+        let loaded = read(&TerrainSpec { height: HeightReference::Msl, ..spec(&path) }).unwrap();
+        assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+        assert_heights(&loaded, never);
+    }
+}
+
+#[test]
+fn the_key_for_the_unit_may_not_contradict_the_file() {
+    let unit =
+        |name: &str, unit: HeightUnit| read(&TerrainSpec { height_unit: Some(unit), ..spec(&format!("dem-scale-unit/d_{name}.tif")) });
+    assert_heights(&unit("unit_ft", HeightUnit::Ft).unwrap(), never);
+    let error = unit("unit_ft", HeightUnit::M).unwrap_err().to_string();
+    assert!(error.contains("unit `ft` of 0.3048 m") && error.contains("scene.terrain.height_unit"), "{error}");
+    // Where the file says nothing, it says it.
+    let loaded = read(&TerrainSpec { height_unit: Some(HeightUnit::Ft), ..spec("ortho/dem.tif") }).unwrap();
+    assert!((height_m(&loaded, [50, 50]).unwrap() - 450.0 * 0.3048).abs() < 1e-3);
+}
+
+#[test]
+fn blocks_that_are_left_out_are_void() {
+    for name in ["d_sp_lzw", "d_sp_none", "d_sparse"] {
+        let loaded = read(&spec(&format!("dem-sparse/{name}.tif"))).unwrap();
+        assert_heights(&loaded, |column, row| column < 32 && row < 32);
+        assert_eq!(loaded.summary.void_heights, 32 * 32);
+    }
+}
+
+#[test]
+fn a_mask_makes_voids() {
+    let loaded = read(&spec("dem-mask/d_internalmask.tif")).unwrap();
+    let masked = |n: u32| (40..56).contains(&n);
+    assert_heights(&loaded, |column, row| masked(column) && masked(row));
+    assert_eq!((loaded.summary.void_heights, loaded.summary.height_range_m), (256, [400.0, 495.0]));
+}
+
+#[test]
+fn a_masked_picture_shows_nothing_there() {
+    let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
+    assert_colors(&loaded, 48..96, 0);
+    // Not black: what is seen of ground without a picture.
+    assert_eq!([[0, 0], [47, 95], [20, 50]].map(|at| color(&loaded, at)), [[118; 3]; 3]);
+}
+
+#[test]
+fn dark_pictures_of_more_than_8_bits_are_named_with_their_scale() {
+    let loaded = read(&with_ortho("ortho/o_u16_11bit.tif")).unwrap();
+    let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+    assert!(note.contains("end at 1840 of 65535") && note.contains("scene.terrain.ortho_white = 2047"), "{note}");
+    // The files were made by times 8.
+    let loaded = read(&TerrainSpec { ortho_white: Some(2040.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
+    assert_colors(&loaded, 0..96, 0);
+    assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+    let loaded = read(&TerrainSpec { ortho_white: Some(1000.0), ..with_ortho("ortho/o_u16_11bit.tif") }).unwrap();
+    assert!(loaded.notes[0].contains("brighter than scene.terrain.ortho_white = 1000"), "{:?}", loaded.notes);
+}
+
+#[test]
+fn what_agencies_ship_is_read() {
+    // Both are lossy: GDAL itself finds colours of up to 6 and 10 away from the true ones.
+    for (name, most, by_gdal) in [
+        ("jpeg_ycbcr", 6, [([28, 3], [98, 36, 103]), ([80, 70], [202, 169, 98]), ([31, 0], [99, 32, 103]), ([32, 0], [103, 31, 97])]),
+        ("webp", 10, [([28, 3], [94, 36, 97]), ([80, 70], [200, 168, 99]), ([31, 0], [97, 37, 98]), ([32, 0], [98, 36, 96])]),
+    ] {
+        let loaded = read(&with_ortho(&format!("ortho/o_{name}.tif"))).unwrap();
+        assert_colors(&loaded, 0..96, most);
+        // Decoders may round otherwise, and make smaller colour planes larger in their own ways.
+        for (at, expected) in by_gdal {
+            let found = color(&loaded, at);
+            assert!((0..3).all(|k| found[k].abs_diff(expected[k]) <= 2), "{name} {at:?}: {found:?} {expected:?}");
+        }
+        assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+    }
+}
+
+#[test]
+fn longitudes_of_190_and_minus_170_degrees_are_one_place() {
+    let loaded = read_terrain(
+        &TerrainSpec { ortho: Some(field("ortho/o_170.tif")), ..spec("ortho/d_190.tif") },
+        &|lat, lon, height| DVec3::new(6.37e6 * (lat - (-17f64).to_radians()), 6.37e6 * (lon - 190f64.to_radians()), -height),
+        None,
+    )
+    .unwrap();
+    assert_eq!(loaded.summary.outside_ortho, 0);
+    assert_eq!(height_m(&loaded, [50, 50]), Some(100.0));
+    assert_colors(&loaded, 0..96, 0);
+    // Each height is in the middle of its own pixel.
+    for (index, at) in [(0, [0, 0]), (64, [64, 0]), (65 * 64 + 10, [10, 64])] {
+        let uv = loaded.terrain.vertices[index].uv;
+        assert!((0..2).all(|k| (uv[k] * 96.0 - at[k] as f32 - 0.5).abs() < 1e-3), "{uv:?} {at:?}");
+    }
+    assert!((loaded.summary.centre_rad[1].to_degrees() - -169.9952).abs() < 1e-9, "{}", loaded.summary.centre_rad[1].to_degrees());
+}
+
+/// The field's ground of 96 x 96 cells of 10 m, with a picture of 20 x 20 pixels of 10 m whose first one is that in column 30, row 40.
+fn small_picture(folder: &Path) -> PathBuf {
+    let path = folder.join("small.png");
+    image::RgbImage::from_fn(20, 20, |x, y| image::Rgb([200, 10 * x as u8, 10 * y as u8])).save(&path).unwrap();
+    std::fs::write(folder.join("small.pgw"), "10 0 0 -10 500305 5199595").unwrap();
+    path
+}
+
+#[test]
+fn ground_beyond_its_picture_is_what_the_key_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = TerrainSpec { ortho: Some(small_picture(folder.path())), ..spec("ortho/dem.tif") };
+    let share = 100.0 * (1.0 - 400.0 / (96.0 * 96.0));
+    let inside = |column: u32, row: u32| (30..50).contains(&column) && (40..60).contains(&row);
+    for (beyond, says) in [(Beyond::Grey, "is grey"), (Beyond::Edge, "of the colours at its border"), (Beyond::Void, "left out")] {
+        let loaded = read(&TerrainSpec { beyond, ..spec.clone() }).unwrap();
+        let [note] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+        assert!(note.contains(&format!("{share:.2} % of the terrain's area")) && note.contains(says), "{note}");
+        assert_eq!(loaded.summary.outside_ortho, 96 * 96 - 400);
+        assert_heights(&loaded, |column, row| beyond == Beyond::Void && !inside(column, row));
+        // In the middle of the picture's pixel (3, 5), and far beyond it, at full size and in every smaller version.
+        let texture = &loaded.terrain.texture;
+        let at = |column: u32, row: u32| {
+            let [x, y] = [column, row].map(|n| n / 64);
+            let vertex =
+                loaded.terrain.chunks[(2 * y + x) as usize].first_vertex + (row - 64 * y) * (if x == 0 { 65 } else { 32 }) + column
+                    - 64 * x;
+            loaded.terrain.vertices[vertex as usize].uv
+        };
+        let pixel = |uv: [f32; 2], size: [u32; 2]| [0, 1].map(|k| (uv[k] * size[k] as f32).clamp(0.0, size[k] as f32 - 1.0) as u32);
+        let [x, y] = pixel(at(33, 45), texture.size_px);
+        let stored = |bytes: &[u8], [x, y]: [u32; 2], width: u32| bytes[4 * (y * width + x) as usize..][..3].to_vec();
+        assert_eq!(stored(&texture.rgba8, [x, y], texture.size_px[0]), [200, 30, 50]);
+        if beyond == Beyond::Grey {
+            assert_eq!(stored(&texture.rgba8, pixel(at(0, 0), texture.size_px), texture.size_px[0]), [118; 3]);
+            for level in texture.mips_within(TexelForm::Stored, loaded.terrain.beyond) {
+                for place in [[0, 0], [95, 3], [5, 95], [95, 95]] {
+                    assert_eq!(
+                        stored(&level.texels, pixel(at(place[0], place[1]), level.size_px), level.size_px[0]),
+                        [118; 3],
+                        "{:?}",
+                        level.size_px
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_picture_that_holds_the_ground_stays_as_it_is() {
+    let loaded = read(&with_ortho("ortho/o_mask.tif")).unwrap();
+    assert_eq!((loaded.terrain.texture.size_px, loaded.terrain.beyond, loaded.summary.picture_uv), ([96, 96], None, [[0.0; 2], [1.0; 2]]));
+    // Half of it is masked.
+    assert!(loaded.notes[0].contains("50.00 % of the terrain's area has no picture and is grey"), "{:?}", loaded.notes);
+    let loaded = read(&TerrainSpec { beyond: Beyond::Void, ..with_ortho("ortho/o_mask.tif") }).unwrap();
+    assert_heights(&loaded, |column, _| column < 48);
+}
