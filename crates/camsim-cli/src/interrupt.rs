@@ -21,6 +21,10 @@ pub fn watch() -> Watch {
     INSTALL.call_once(|| {
         let _ = ctrlc::set_handler(|| {
             if RUNS.load(Ordering::SeqCst) == 0 || ASKED.swap(true, Ordering::SeqCst) {
+                #[allow(
+                    clippy::disallowed_methods,
+                    reason = "asked twice: what is half written has a temporary name, which the next run removes"
+                )]
                 std::process::exit(i32::from(INTERRUPTED));
             }
             // Nobody is left to tell if this stream is closed.

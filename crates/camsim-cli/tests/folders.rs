@@ -21,6 +21,7 @@ fn runs_as_the_program() {
     let Ok(args) = std::env::var(ARGS) else { return };
     let (mut out, mut err) = (std::io::stdout(), std::io::stderr());
     let code = camsim_cli::run(std::iter::once("camsim").chain(args.split(BETWEEN)).map(OsString::from), &mut out, &mut err);
+    #[allow(clippy::disallowed_methods, reason = "the exit code is what is tested, and nothing is left to be dropped")]
     std::process::exit(i32::from(code));
 }
 
@@ -236,6 +237,7 @@ fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
     };
     while count() < 2 {
         assert!(begin.elapsed() < Duration::from_secs(120), "no frame came");
+        #[allow(clippy::disallowed_methods, reason = "files of another process tell nobody when they come")]
         std::thread::sleep(Duration::from_millis(5));
     }
     let process = rustix::process::Pid::from_raw(child.id() as i32).unwrap();

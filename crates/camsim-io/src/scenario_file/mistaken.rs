@@ -9,6 +9,11 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
     let shown = path.display();
     let name = path.file_name()?.to_string_lossy().into_owned();
     let told = |what: &str, way: String| Some(format!("{shown} is {what}, not a scenario: {way}"));
+    if path.is_dir() {
+        let run = path.join("run.json");
+        let way = if run.is_file() { format!("its own is {}", run.display()) } else { "name the .toml file in it".to_owned() };
+        return told("a folder", way);
+    }
     if let Some(kind) = picture(bytes) {
         let way = format!(
             "a picture on the ground goes into one as scene.pattern = {{ image = {name:?}, width_m = 100.0 }}, one that another program rendered \
@@ -38,6 +43,10 @@ pub(super) fn mistaken(path: &Path, bytes: &[u8]) -> Option<String> {
     }
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml")) {
         return None;
+    }
+    if text.starts_with("frame,stamp_ns,") {
+        let run = path.with_file_name("run.json");
+        return told("the table of a run's frames", format!("the scenario of that run is {}", run.display()));
     }
     let calibration = ["distortion", "intrinsics", "camera_matrix", "camera_model", "Camera_Matrix", "<calibration", "fisheye_params"];
     if calibration.iter().any(|mark| text.contains(mark)) {
@@ -140,11 +149,16 @@ mod tests {
             ("a.glb", b"glTF\x02", "scene.gltf = [{ file = \"a.glb\" }]"),
             ("CAMERA.toml", b"size_px = [640, 480]\n[lens]\nmodel = \"pinhole\"\n", "is a camera file, not a scenario: name it in one:"),
             ("F.toml", b"color = \"a.png\"\nfocal_px = [1.0, 1.0]\n", "`camsim apply CAMERA.toml F.toml -o out.png`"),
+            ("out/frames.csv", b"frame,stamp_ns,n,e\n0,0,1,2\n", "the scenario of that run is out/run.json"),
             ("c.yaml", b"cam0:\n  camera_model: pinhole\n  intrinsics: [1, 2, 3, 4]\n", "`camsim camera import c.yaml -o CAMERA.toml`"),
         ] {
             let said = said(name, bytes);
             assert!(said.contains(wanted), "{name}: {said}");
         }
+        let folder = tempfile::tempdir().unwrap();
+        assert!(mistaken(folder.path(), b"").unwrap().ends_with("is a folder, not a scenario: name the .toml file in it"));
+        std::fs::write(folder.path().join("run.json"), "{}").unwrap();
+        assert!(mistaken(folder.path(), b"").unwrap().ends_with("/run.json"));
         for (name, bytes) in [
             ("s.toml", &b"[flight]\nlogg = \"a.csv\"\n"[..]),
             ("s.toml", b""),
