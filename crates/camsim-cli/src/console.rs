@@ -1,8 +1,10 @@
 //! Where text goes: answers to standard output, everything about the work to standard error.
 
 use std::{
+    ffi::{OsStr, OsString},
     fmt,
     io::{self, Write},
+    path::{Path, PathBuf},
 };
 
 use serde::Serialize;
@@ -15,6 +17,10 @@ pub struct Console<'a> {
     err: &'a mut dyn Write,
     quiet: bool,
     verbose: bool,
+    /// What was typed, the program's name first.
+    typed: Vec<OsString>,
+    /// The scenario, and what of the command line belongs to it.
+    scenario: Option<(PathBuf, Vec<String>)>,
 }
 
 impl fmt::Debug for Console<'_> {
@@ -26,7 +32,34 @@ impl fmt::Debug for Console<'_> {
 impl<'a> Console<'a> {
     /// Answers to `out`, the rest to `err`.
     pub fn new(out: &'a mut dyn Write, err: &'a mut dyn Write) -> Self {
-        Self { out: io::BufWriter::new(out), err, quiet: false, verbose: false }
+        Self { out: io::BufWriter::new(out), err, quiet: false, verbose: false, typed: Vec::new(), scenario: None }
+    }
+
+    /// What was typed, for hints that name a command.
+    pub fn set_typed(&mut self, typed: Vec<OsString>) {
+        self.typed = typed;
+    }
+
+    /// The scenario that a command is about, and the options that change it.
+    pub fn set_scenario(&mut self, scenario: &Path, changes: Vec<String>) {
+        self.scenario = Some((scenario.into(), changes));
+    }
+
+    /// The command that was typed, with one more option.
+    #[must_use]
+    pub fn command_with(&self, option: &str) -> String {
+        let words = self.typed.iter().map(OsString::as_os_str).filter(|word| *word != option);
+        words.chain([option.as_ref()]).map(quoted).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Text whose commands name the scenario in place of `SCENARIO.toml`, with the options that change it where the command takes them.
+    #[must_use]
+    pub fn whole(&self, text: &str) -> String {
+        let Some((scenario, changes)) = &self.scenario else { return text.to_owned() };
+        let path = quoted(scenario.as_os_str());
+        let words = changes.iter().map(|word| quoted(word.as_ref()));
+        let with_changes = std::iter::once(path.clone()).chain(words).collect::<Vec<_>>().join(" ");
+        text.replace("camsim lens SCENARIO.toml", &format!("camsim lens {path}")).replace("SCENARIO.toml", &with_changes)
     }
 
     /// `-q` and `-v`.
@@ -110,7 +143,36 @@ impl<'a> Console<'a> {
         if failure.is_broken_pipe() {
             return DONE;
         }
-        self.complain(&format!("{failure}\n"));
+        self.complain(&format!("{}\n", self.whole(&failure.to_string())));
         failure.code()
+    }
+}
+
+/// A word as a shell takes it.
+#[must_use]
+pub fn quoted(word: &OsStr) -> String {
+    let text = word.to_string_lossy();
+    let is_plain = |c: char| c.is_alphanumeric() || "_./=:,@%+-".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) { text.into_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hints_name_commands_whole() {
+        let (mut out, mut err) = (Vec::new(), Vec::new());
+        let mut console = Console::new(&mut out, &mut err);
+        let hint = "see `camsim lens SCENARIO.toml check` and `camsim explain SCENARIO.toml --frame 5`";
+        assert_eq!(console.whole(hint), hint);
+        console.set_scenario(Path::new("my flights/a.toml"), vec!["--set".into(), "camera.size_px=[9, 9]".into()]);
+        let whole =
+            "see `camsim lens 'my flights/a.toml' check` and `camsim explain 'my flights/a.toml' --set 'camera.size_px=[9, 9]' --frame 5`";
+        assert_eq!(console.whole(hint), whole);
+        console.set_typed(["target/camsim", "render", "it's.toml", "-o", "out"].map(OsString::from).to_vec());
+        assert_eq!(console.command_with("--resume"), "target/camsim render 'it'\\''s.toml' -o out --resume");
+        console.set_typed(["camsim", "render", "a.toml", "--resume", "-q"].map(OsString::from).to_vec());
+        assert_eq!(console.command_with("--resume"), "camsim render a.toml -q --resume");
     }
 }

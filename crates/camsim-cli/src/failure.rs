@@ -13,6 +13,9 @@ pub const BAD_INPUT: u8 = 2;
 /// Exit code of a machine without an adapter.
 pub const NO_ADAPTER: u8 = 3;
 
+/// Exit code of a run that the user has stopped, as shells have it.
+pub const INTERRUPTED: u8 = 130;
+
 /// An error with its exit code.
 #[derive(Debug)]
 pub struct Failure {
@@ -29,6 +32,11 @@ impl Failure {
     /// Anything that went wrong with good input.
     pub fn failed(error: impl Into<anyhow::Error>) -> Self {
         Self { code: FAILED, error: error.into() }
+    }
+
+    /// Stopped by the user; the error says what is done.
+    pub fn interrupted(error: impl Into<anyhow::Error>) -> Self {
+        Self { code: INTERRUPTED, error: error.into() }
     }
 
     /// The exit code.
@@ -51,7 +59,8 @@ impl fmt::Display for Failure {
     /// `error: ...`, then a line `caused by: ...` for each cause that the lines before do not state already.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut said = self.error.to_string();
-        write!(f, "error: {said}")?;
+        let begin = if self.code == INTERRUPTED { "stopped" } else { "error" };
+        write!(f, "{begin}: {said}")?;
         for cause in self.error.chain().skip(1).map(ToString::to_string) {
             if !said.contains(&cause) {
                 write!(f, "\n  caused by: {cause}")?;
@@ -71,7 +80,7 @@ impl From<io::Error> for Failure {
 impl From<GpuError> for Failure {
     fn from(error: GpuError) -> Self {
         let code = match error {
-            GpuError::NoAdapter(_) => NO_ADAPTER,
+            GpuError::NoAdapter(_) | GpuError::UnknownAdapter { .. } => NO_ADAPTER,
             GpuError::TooLarge { .. } | GpuError::Setting { .. } => BAD_INPUT,
             _ => FAILED,
         };

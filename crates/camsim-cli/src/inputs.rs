@@ -37,6 +37,15 @@ pub struct Changes {
     pub preset: Option<PresetArg>,
 }
 
+impl Changes {
+    /// As they are typed.
+    fn words(&self) -> Vec<String> {
+        let sets = self.sets.iter().flat_map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
+        let preset = self.preset.iter().flat_map(|preset| ["--preset".to_owned(), format!("{preset:?}").to_lowercase()]);
+        sets.chain(preset).collect()
+    }
+}
+
 /// `--preset`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum PresetArg {
@@ -54,8 +63,9 @@ fn parse_set(text: &str) -> Result<(String, String), String> {
 }
 
 impl ScenarioArgs {
-    /// Reads the scenario and applies the changes.
-    pub fn read(&self) -> Result<Scenario, Failure> {
+    /// Reads the scenario and applies the changes; hints name it from now on.
+    pub fn read(&self, console: &mut Console<'_>) -> Result<Scenario, Failure> {
+        console.set_scenario(&self.scenario, self.changes.words());
         let preset = self.changes.preset.map(|preset| match preset {
             PresetArg::Default => Preset::Default,
             PresetArg::Paper => Preset::Paper,
@@ -66,7 +76,8 @@ impl ScenarioArgs {
 
 /// Loads what the scenario names; warnings are said once.
 pub fn load(scenario: &Scenario, console: &mut Console<'_>) -> Result<Loaded, Failure> {
-    let loaded = load_sequence(scenario).or_bad_input()?;
+    let mut loaded = load_sequence(scenario).or_bad_input()?;
+    loaded.warnings.iter_mut().for_each(|warning| *warning = console.whole(warning));
     for warning in &loaded.warnings {
         console.warn(warning);
     }

@@ -18,6 +18,7 @@ pub mod failure;
 mod frame_list;
 mod frame_source;
 mod inputs;
+mod interrupt;
 mod output;
 mod progress;
 mod render_run;
@@ -42,6 +43,7 @@ Exit codes:
   1  it failed on the way (disk, device, a check that did not hold)
   2  wrong usage or bad input: the message says where, and what to do
   3  no usable graphics adapter
+  130  stopped by Ctrl-C: what is written is whole, and the message says how to go on
 
 CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`). CAMSIM_REVERSE=device or host says where output frames are made from
 ideal frames, CAMSIM_IDEAL=device or host where those are drawn (`camsim info --help`).";
@@ -88,6 +90,8 @@ pub fn main() -> ExitCode {
 /// Runs the program with `args` (the first is the program's name) and gives the exit code.
 pub fn run(args: impl IntoIterator<Item = OsString>, stdout: &mut dyn Write, stderr: &mut dyn Write) -> u8 {
     let mut console = Console::new(stdout, stderr);
+    let args: Vec<OsString> = args.into_iter().collect();
+    console.set_typed(args.clone());
     let outcome = match Cli::try_parse_from(args) {
         Ok(cli) => {
             console.set_volume(cli.quiet, cli.verbose);

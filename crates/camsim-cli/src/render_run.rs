@@ -1,6 +1,7 @@
 //! A sequence through a renderer into an output folder.
 
 use std::{
+    collections::BTreeMap,
     ops::ControlFlow,
     path::Path,
     sync::Arc,
@@ -8,22 +9,30 @@ use std::{
 };
 
 use anyhow::anyhow;
-use camsim_core::{frame::RenderedFrame, plan::Planner, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
+use camsim_core::{frame::RenderedFrame, sequence::Sequence};
 use camsim_gpu::engine::Finished;
 use camsim_io::{
     inputs,
-    manifest::{ResumeError, RunManifest, check_resume, check_resume_of, in_shard},
-    write::{FrameFiles, FrameRecord, FrameWriter, TrajectoryRecord, WriteError, camera_toml, frames_csv, trajectory_csv, write_atomic},
+    manifest::{RunManifest, in_shard},
+    write::{FrameFiles, FrameWriter, WriteError},
 };
 
 use crate::{
-    console::Console,
+    console::{Console, quoted},
     failure::{Failure, OrFail},
     frame_list::Shard,
     frame_source::FrameSource,
+    interrupt,
     progress::{frames_bar, waiting},
     tolerances::{Rings, Tolerances},
 };
+
+mod folder;
+mod tables;
+
+use folder::Standing;
+pub use folder::{Lock, refuse_others, refuse_unknown};
+pub use tables::{body_at, camera_at, source_frame};
 
 /// What to render and where to.
 #[derive(Debug)]
@@ -40,6 +49,8 @@ pub struct Job<'a> {
     pub resume: bool,
     /// Said while loading; kept in `run.json`.
     pub warnings: &'a [String],
+    /// The command that renders what is missing, for whoever stops the run.
+    pub go_on: &'a str,
 }
 
 /// What a run did.
@@ -65,8 +76,8 @@ impl Outcome {
     }
 }
 
-/// Renders; `look` sees each finished frame before it is written, and can stop the run: frames that are written then stay, and `run.json` says
-/// that it is not finished.
+/// Renders; `look` sees each finished frame before it is written, and can stop the run, as Ctrl-C can: frames that are written then stay, the tables are of
+/// them, and `run.json` says that it is not finished.
 pub fn run(
     job: &Job<'_>,
     source: &mut dyn FrameSource,
@@ -74,10 +85,10 @@ pub fn run(
     look: &mut dyn FnMut(&Finished) -> ControlFlow<()>,
 ) -> Result<Outcome, Failure> {
     let scenario = &job.sequence.scenario;
-    let files = FrameFiles::new(job.folder, &scenario.output, scenario.camera.photometric.output);
+    let files = folder::files_of(scenario, job.folder);
     let inputs = inputs::of_scenario(scenario);
     let adapter = source.adapter();
-    check_folder(job, &inputs, &adapter, console)?;
+    folder::check(job, &files, &inputs, &adapter, console)?;
     let mine: Vec<u64> = job.frames.iter().copied().filter(|&frame| job.shard.is_none_or(|shard| in_shard(frame, shard.0))).collect();
     let todo: Vec<u64> = mine.iter().copied().filter(|&frame| !(job.resume && files.exist(frame))).collect();
     // What cannot be planned is refused before anything is written.
@@ -93,6 +104,7 @@ pub fn run(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         adapter,
         seed: scenario.seed,
+        paths: String::new(),
         scenario: scenario.clone(),
         inputs,
         frames: [job.frames.first().copied().unwrap_or(0), job.frames.last().map_or(0, |last| last + 1)],
@@ -102,16 +114,16 @@ pub fn run(
         finished: false,
         warnings: job.warnings.to_vec(),
     };
-    manifest.write(job.folder).or_failed()?;
-    files.sweep(&todo);
-    write_tables(job, &files, source.planner())?;
+    prepare(job, &files, &todo, &manifest, source, console)?;
 
     let writes_frames = !scenario.output.format.is_empty();
-    let writer = writes_frames.then(|| FrameWriter::new(files, threads()));
+    let writer = writes_frames.then(|| FrameWriter::new(files.clone(), threads()));
     let (mut blind, mut empty, mut rings) = (0_u64, 0_u64, Rings::default());
     let mut tolerances = Tolerances::new(&scenario.quality);
+    let mut made = BTreeMap::new();
     let bar = frames_bar(todo.len() as u64, console.is_quiet());
     let begin = Instant::now();
+    let watch = interrupt::watch();
     let rendered = source.render(&todo, &mut |finished| {
         if look(&finished).is_break() {
             return Err(WriteError::Stopped);
@@ -120,22 +132,72 @@ pub fn run(
         empty += u64::from(is_empty(&finished.frame));
         rings.add(finished.plan.frame, finished.out_of_order);
         tolerances.iter_mut().for_each(|tolerances| tolerances.add(&finished.plan));
+        made.insert(finished.plan.frame, source_frame(job.sequence, &finished.plan));
         bar.inc(1);
-        writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))
+        writer.as_ref().map_or(Ok(()), |writer| writer.write(finished.frame))?;
+        if watch.is_asked() { Err(WriteError::Stopped) } else { Ok(()) }
     });
     bar.finish_and_clear();
-    rendered?;
-    let unseen = unseen_warnings(blind, empty, todo.len()).chain(rings.warning(todo.len()));
-    let said: Vec<String> = unseen.chain(tolerances.iter().flat_map(Tolerances::warnings)).collect();
+    // All that was rendered is on disk before anything is said of it.
+    let written = writer.map(FrameWriter::finish).transpose().or_failed();
+    let is_stopped = rendered.is_err() && watch.is_asked();
+    drop(watch);
+    let time = begin.elapsed();
+    let said: Vec<String> = if rendered.is_ok() {
+        let unseen = unseen_warnings(blind, empty, todo.len()).chain(rings.warning(todo.len()));
+        unseen.chain(tolerances.iter().flat_map(Tolerances::warnings)).map(|warning| console.whole(&warning)).collect()
+    } else {
+        Vec::new()
+    };
     said.iter().for_each(|warning| console.warn(warning));
     manifest.warnings.extend(said);
-    let bytes = writer.map(FrameWriter::finish).transpose().or_failed()?.map_or(0, |summary| summary.bytes);
-    let time = begin.elapsed();
-
-    manifest.written = todo.len() as u64;
-    manifest.finished = true;
-    manifest.write(job.folder).or_failed()?;
+    manifest.written = made.keys().filter(|&&frame| !writes_frames || files.exist(frame)).count() as u64;
+    manifest.finished = rendered.is_ok() && written.is_ok();
+    let told = finish(job, &files, &made, &manifest, source);
+    if is_stopped && written.is_ok() {
+        told?;
+        let done = if writes_frames { mine.iter().filter(|&&frame| files.exist(frame)).count() as u64 } else { manifest.written };
+        let folder = job.folder.display();
+        return Err(Failure::interrupted(anyhow!("{done} of {} frames are in {folder}; to go on: {}", mine.len(), job.go_on)));
+    }
+    rendered?;
+    let bytes = written?.map_or(0, |summary| summary.bytes);
+    told?;
     Ok(Outcome { frames: manifest.written, skipped: manifest.skipped, bytes, time, first_plan })
+}
+
+/// Writes what there is to say before the first frame; of a folder of another scenario nothing stays that this one could take for its own.
+fn prepare(
+    job: &Job<'_>,
+    files: &FrameFiles,
+    todo: &[u64],
+    manifest: &RunManifest,
+    source: &mut dyn FrameSource,
+    console: &mut Console<'_>,
+) -> Result<(), Failure> {
+    let _lock = Lock::take(job.folder)?;
+    // Again, now that nobody else changes it.
+    let standing = folder::standing(job, files, &manifest.inputs)?;
+    if standing == Standing::Replaced {
+        files.remove(job.frames).or_failed()?;
+    }
+    manifest.write(job.folder).or_failed()?;
+    files.sweep(todo);
+    tables::write_fixed(job, source.planner(), console)?;
+    tables::begin_frames(job, standing == Standing::Ours)
+}
+
+/// Writes what there is to say after the last.
+fn finish(
+    job: &Job<'_>,
+    files: &FrameFiles,
+    made: &BTreeMap<u64, camsim_io::write::SourceFrame>,
+    manifest: &RunManifest,
+    source: &mut dyn FrameSource,
+) -> Result<(), Failure> {
+    let _lock = Lock::take(job.folder)?;
+    tables::end_frames(job, files, source.planner(), made)?;
+    manifest.write(job.folder).or_failed()
 }
 
 /// Of frames that see only sky, and of those without a valid pixel.
@@ -146,7 +208,7 @@ fn unseen_warnings(blind: u64, empty: u64, frames: usize) -> impl Iterator<Item 
     let empty = (empty > 0).then(|| {
         format!(
             "{empty} of {frames} frames have no valid pixel: no ray of the camera's is in the ideal frame, or the lens has none; check \
-             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain`"
+             camera.principal_point_px and camera.focal_px against camera.size_px, and see `camsim explain SCENARIO.toml`"
         )
     });
     blind.into_iter().chain(empty)
@@ -157,87 +219,9 @@ fn is_empty(frame: &RenderedFrame) -> bool {
     !frame.color_rgba.is_empty() && frame.color_rgba.chunks_exact(4).all(|pixel| pixel[3] <= 0.0)
 }
 
-/// Frames of another scenario are never taken for this one's; without `--resume` they are only worth a warning.
-fn check_folder(job: &Job<'_>, inputs: &inputs::Inputs, adapter: &str, console: &mut Console<'_>) -> Result<(), Failure> {
-    match check_resume(job.folder, &job.sequence.scenario, inputs) {
-        Err(error) if job.resume => Err(Failure::bad_input(error)),
-        Err(ResumeError::Differs { path, made, .. }) => {
-            console.warn(format_args!("{} was made {made}: files of the same name are replaced, others stay", path.display()));
-            Ok(())
-        }
-        Ok(true) if job.resume => {
-            if let Err(ResumeError::Differs { path, .. }) = check_resume_of(job.folder, "adapter", "by another adapter", &adapter) {
-                console.warn(format_args!(
-                    "{} was made by another adapter than {adapter}: frames that are there stay, and differ from what this one would make by what rounding does",
-                    path.display()
-                ));
-            }
-            Ok(())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
-const MOST_TRAJECTORY_ROWS: f64 = 10e6;
-
-/// `camera.toml`, `trajectory.csv` and `frames.csv`.
-fn write_tables(job: &Job<'_>, files: &FrameFiles, planner: &Planner) -> Result<(), Failure> {
-    let sequence = job.sequence;
-    let camera = camera_toml(&sequence.scenario.camera).or_failed()?;
-    write_atomic(&job.folder.join("camera.toml"), camera.as_bytes()).or_failed()?;
-    let seen_s = planner.stamp_s(sequence.frames - 1) - planner.stamp_s(0);
-    let rows = seen_s * sequence.scenario.tracker.rate_hz;
-    if rows > MOST_TRAJECTORY_ROWS {
-        return Err(Failure::bad_input(anyhow!(
-            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make flight.window_s shorter or tracker.rate_hz lower"
-        )));
-    }
-    let trajectory = trajectory_csv(trajectory_records(sequence, planner).or_bad_input()?);
-    write_atomic(&job.folder.join("trajectory.csv"), trajectory.as_bytes()).or_failed()?;
-    // A resumed folder may hold frames beyond those asked for now.
-    let kept = (0..sequence.frames).filter(|&frame| job.frames.binary_search(&frame).is_ok() || (job.resume && files.exist(frame)));
-    let records: Vec<FrameRecord> = kept.map(|frame| frame_record(sequence, files, planner, frame)).collect();
-    write_atomic(&job.folder.join("frames.csv"), frames_csv(&records).as_bytes()).or_failed()
-}
-
-fn frame_record(sequence: &Sequence, files: &FrameFiles, planner: &Planner, frame: u64) -> FrameRecord {
-    let stamp_s = planner.stamp_s(frame);
-    let pose = sequence.path.pose(stamp_s);
-    FrameRecord {
-        frame,
-        stamp_ns: log_ns(sequence.epoch_ns, stamp_s),
-        position_ned_m: pose.position_ned_m,
-        ned_from_camera: pose.ned_from_camera,
-        files: files.names(frame),
-    }
-}
-
-/// The motion at control ticks, from the first to the last instant that any frame sees.
-fn trajectory_records(
-    sequence: &Sequence,
-    planner: &Planner,
-) -> Result<impl Iterator<Item = TrajectoryRecord>, camsim_core::shutter::ShutterError> {
-    let Scenario { camera, tracker, .. } = &sequence.scenario;
-    let (first_s, last_s) = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px)?.window_s();
-    let seen_s = [planner.stamp_s(0) + first_s, planner.stamp_s(sequence.frames - 1) + last_s];
-    Ok(motion(&sequence.path.trajectory, sequence.epoch_ns, tracker.rate_hz, seen_s))
-}
-
-/// States at `start + k / rate_hz` that enclose `seen_s`; outside of the log the platform coasts.
-pub fn motion(trajectory: &Trajectory, epoch_ns: i64, rate_hz: f64, seen_s: [f64; 2]) -> impl Iterator<Item = TrajectoryRecord> + use<'_> {
-    let start_s = trajectory.span_s().0;
-    let tick = |t_s: f64| (t_s - start_s) * rate_hz;
-    let (first, last) = ((tick(seen_s[0]) + 1e-6).floor() as i64, (tick(seen_s[1]) - 1e-6).ceil() as i64);
-    (first..=last).map(move |k| {
-        let t_s = start_s + k as f64 / rate_hz;
-        TrajectoryRecord { t_ns: log_ns(epoch_ns, t_s), state: trajectory.state(t_s) }
-    })
-}
-
-/// Path time to the log's clock, nanoseconds.
-fn log_ns(epoch_ns: i64, t_s: f64) -> i64 {
-    epoch_ns.saturating_add((t_s * 1e9).round() as i64)
+/// The command that renders what a folder's own scenario has beyond the frames that are there.
+pub fn go_on(folder: &Path) -> String {
+    format!("camsim render {} -o {} --resume", quoted(folder.join("run.json").as_os_str()), quoted(folder.as_os_str()))
 }
 
 fn threads() -> usize {

@@ -71,7 +71,7 @@ impl Broken {
             "too many pixels have no source".to_owned()
         };
         Some(format!(
-            "{frames} of {of} frames do not keep {key} = {tolerance}: in the worst, frame {frame}, {expected}; `camsim explain --frame {frame}` says why"
+            "{frames} of {of} frames do not keep {key} = {tolerance}: in the worst, frame {frame}, {expected}; `camsim explain SCENARIO.toml --frame {frame}` says why"
         ))
     }
 }
@@ -101,7 +101,7 @@ impl Rings {
         let frames = self.frames;
         Some(format!(
             "in {frames} of {of} frames blended triangles cover each other in rings, so that up to {most}, in frame {frame}, are mixed before what is \
-             behind them, which no prediction counts; `camsim verify --pictures` measures it, quality.solver = \"oracle\" does without"
+             behind them, which no prediction counts; `camsim verify SCENARIO.toml --pictures --frames {frame}` measures it, quality.solver = \"oracle\" does without"
         ))
     }
 }
@@ -133,7 +133,7 @@ mod tests {
         }
         let said: Vec<String> = tolerances.warnings().collect();
         let wanted = "3 of 4 frames do not keep quality.max_error_px = 0.05: in the worst, frame 5, 0.31 px are predicted; \
-                      `camsim explain --frame 5` says why";
+                      `camsim explain SCENARIO.toml --frame 5` says why";
         assert_eq!(said, [wanted]);
     }
 

@@ -182,8 +182,9 @@ fn the_built_in_flight_is_tracked_and_explained() {
         .skip(1)
         .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
         .collect();
-    // 46 s at 25 Hz, both ends.
-    assert_eq!(rows.len(), 1151);
+    // The window of 10 to 12 s at 25 Hz, both ends.
+    assert_eq!(rows.len(), 51);
+    assert!((rows[50][0] - rows[0][0] - 2.0).abs() < 1e-8);
     assert!(rows.iter().all(|row| row.len() == 20 && row.iter().all(|value| value.is_finite())));
     assert!(rows.windows(2).all(|pair| (pair[1][0] - pair[0][0] - 0.04).abs() < 1e-8));
 
@@ -198,6 +199,82 @@ fn the_built_in_flight_is_tracked_and_explained() {
     assert!(err.contains("scene.light changes nothing"), "{err}");
     let (code, out, err) = camsim(["explain", text(&assets().join("demo.toml")), "--set", "scene.light.sun=0.7"]);
     assert!(code == 0 && out.contains("in steps of 8 bits") && !err.contains("changes nothing"), "{out} {err}");
+}
+
+#[test]
+fn the_camera_is_tracked_with_its_mount_and_vibration() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scenario, table) = (assets().join("pattern.toml"), folder.path().join("poses.csv"));
+    let track = |more: &[&str]| {
+        let (code, _, err) = camsim([&["track", text(&scenario), "-o", text(&table)][..], more].concat());
+        assert_eq!(code, 0, "{err}");
+        let all = fs::read_to_string(&table).unwrap();
+        let header = all.lines().next().unwrap().to_owned();
+        let rows = all.lines().skip(1).map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect::<Vec<Vec<f64>>>();
+        (header, rows, err)
+    };
+    let still = ["--set", "camera.mount.vibration=[]", "--set", "camera.mount.offset_m=[2, 0, 0]", "--rate", "100"];
+    let (_, body, _) = track(&still);
+    let (header, rigid, err) = track(&[&still[..], &["--of", "camera"]].concat());
+    assert_eq!(header, "t_s,n_m,e_m,d_m,vn,ve,vd,qw,qx,qy,qz,wx,wy,wz");
+    assert!(body.len() == 201 && rigid.len() == 201 && !err.contains("too few"), "{err}");
+    let shaken = ["--set", "camera.mount.vibration=[{ axis = \"roll\", amplitude_deg = 0.5, hz = 17, phase_deg = 30 }]"];
+    let (_, shaken, err) = track(&[&still[2..], &shaken[..], &["--of", "camera"]].concat());
+    assert!(!err.contains("too few"), "{err}");
+    for (i, (body, (rigid, shaken))) in body.iter().zip(rigid.iter().zip(&shaken)).enumerate() {
+        assert_eq!((body[0], body[0]), (rigid[0], shaken[0]));
+        let quaternion = |row: &[f64]| glam::DQuat::from_xyzw(row[1], row[2], row[3], row[0]);
+        let (of_body, of_rigid, of_shaken) = (quaternion(&body[10..14]), quaternion(&rigid[7..11]), quaternion(&shaken[7..11]));
+        // Straight down, its top towards the nose, 2 m ahead.
+        let ahead = of_body * glam::DVec3::new(2.0, 0.0, 0.0);
+        let apart = glam::DVec3::new(rigid[1] - body[1], rigid[2] - body[2], rigid[3] - body[3]);
+        assert!((apart - ahead).length() < 1e-9, "{apart} {ahead}");
+        assert!((of_rigid * glam::DVec3::Z - of_body * glam::DVec3::Z).length() < 1e-9);
+        assert!((of_rigid * -glam::DVec3::Y - of_body * glam::DVec3::X).length() < 1e-9);
+        // The window begins 10 s after the first good row, from which the phase counts; about the body's forward axis, before the mount.
+        let angle_rad = 0.5_f64.to_radians() * (std::f64::consts::TAU * 17.0 * (10.0 + 0.01 * i as f64) + 30_f64.to_radians()).sin();
+        let expected = of_body * glam::DQuat::from_rotation_x(angle_rad) * of_body.inverse() * of_rigid;
+        assert!(of_shaken.angle_between(expected) < 1e-7, "{i}: {}", of_shaken.angle_between(expected));
+    }
+    let (_, _, err) = track(&["--of", "camera", "--rate", "30", "--set", "output.stamps=zero"]);
+    assert!(err.contains("30 rows a second are too few to show the mount's vibration of 17 Hz: give --rate 136"), "{err}");
+    assert!(fs::read_to_string(&table).unwrap().lines().nth(1).unwrap().starts_with("0.000000000,"));
+}
+
+#[test]
+fn explain_says_what_source_coordinates_are_in() {
+    let scenario = assets().join("pattern.toml");
+    let (code, out, err) = camsim(["explain", text(&scenario), "--frame", "3", "--json"]);
+    assert_eq!(code, 0, "{err}");
+    let explained: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let (plan, source) = (&explained["plan"], &explained["source_frame"]);
+    assert_eq!(source["ideal_width_px"], plan["ideal_size_px"][0]);
+    assert_eq!((&source["ideal_fx_px"], &source["ideal_cy_px"]), (&plan["ideal_focal_px"][0], &plan["ideal_principal_px"][1]));
+    let q: Vec<f64> = source["ideal_q_wxyz"].as_array().unwrap().iter().map(|q| q.as_f64().unwrap()).collect();
+    assert!((q.iter().map(|q| q * q).sum::<f64>() - 1.0).abs() < 1e-9 && source["ideal_t_ns"].is_i64());
+    let (_, out, _) = camsim(["explain", text(&scenario), "--frame", "3"]);
+    let width = &source["ideal_width_px"];
+    assert!(
+        out.contains(&format!("source coordinates (x, y of coords) are in a frame of {width}x")) && out.contains("ned_from_camera w "),
+        "{out}"
+    );
+}
+
+#[test]
+fn what_is_given_in_place_of_a_scenario_is_recognised() {
+    let assets = assets();
+    for (file, wanted) in [
+        ("demo_flight.csv", "log = \"demo_flight.csv\"\n    [scene]\n    terrain = { dem = \"dem.tif\", ortho = \"ortho.tif\" }"),
+        ("demo_camera.toml", "demo_camera.toml is a camera file, not a scenario: name it in one:"),
+        ("acircles.png", "acircles.png is a picture (PNG), not a scenario"),
+        ("demo_dem.tif", "demo_dem.tif is a TIFF, not a scenario"),
+    ] {
+        let file = assets.join(file);
+        for command in ["render", "explain", "track", "verify"] {
+            let (code, _, err) = camsim([command, text(&file)]);
+            assert!(code == 2 && err.contains(wanted), "{command}: {err}");
+        }
+    }
 }
 
 #[test]

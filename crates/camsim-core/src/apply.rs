@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::{
     camera::CameraModel,
     frame::RenderedFrame,
-    noise::tail_table,
+    noise::{camera_seed, tail_table},
     photometric::{photometric, vignette_weights},
     plan::PathStage,
     scenario::{CameraSpec, Preset, Solver},
@@ -72,7 +72,7 @@ pub struct Settings {
     pub blur_samples: Option<u32>,
     /// The paper's fog, only with its preset.
     pub fog: Option<paper::LinearFog>,
-    /// Seed of the noise.
+    /// Seed of the noise, with the camera's name ([`camera_seed`]).
     pub seed: u64,
     /// Frame number, for the noise and as the frame's name.
     pub frame: u64,
@@ -100,6 +100,7 @@ pub struct Pipeline<'a> {
     /// Stored values, for the paper's preset only.
     stored_rgba: Vec<f32>,
     nodes: u32,
+    noise_seed: u64,
 }
 
 impl<'a> Pipeline<'a> {
@@ -135,8 +136,10 @@ impl<'a> Pipeline<'a> {
         let edges = DepthEdges::new(&depth);
         let stored_rgba = if paper { frame.color_rgba.iter().map(|&v| srgb_from_linear(v.clamp(0.0, 1.0))).collect() } else { Vec::new() };
         let twist = motion.twist_at(frame.instant_s);
+        let noise_seed = camera_seed(settings.seed, &spec.name);
+        let settings = settings.clone();
         let mut pipeline =
-            Self { spec, camera, shutter, frame, motion, settings: settings.clone(), solver, twist, edges, flow, stored_rgba, nodes: 1 };
+            Self { spec, camera, shutter, frame, motion, settings, solver, twist, edges, flow, stored_rgba, nodes: 1, noise_seed };
         pipeline.nodes = pipeline.exposure_nodes();
         Ok(pipeline)
     }
@@ -248,7 +251,7 @@ impl<'a> Pipeline<'a> {
         let depth_m = middle.map_or(0.0, |source| if source.inverse_depth > 0.0 { (1.0 / source.inverse_depth) as f32 } else { 0.0 });
         let frame = self.settings.frame as u32;
         let finish =
-            |color: DVec3| photometric(&self.spec.photometric, color.as_vec3().to_array(), weight, pixel, frame, self.settings.seed, table);
+            |color: DVec3| photometric(&self.spec.photometric, color.as_vec3().to_array(), weight, pixel, frame, self.noise_seed, table);
         if weight <= 0.0 {
             return Ok((finish(DVec3::ZERO), depth_m));
         }

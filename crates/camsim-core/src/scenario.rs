@@ -50,6 +50,14 @@ pub struct Scenario {
     pub output: OutputSpec,
 }
 
+impl Scenario {
+    /// Seed of the camera's noise: the scenario's, and the camera's name.
+    #[must_use]
+    pub fn noise_seed(&self) -> u64 {
+        crate::noise::camera_seed(self.seed, &self.camera.name)
+    }
+}
+
 /// `[flight]`: the log and how its columns are meant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -347,6 +355,10 @@ pub struct OutputSpec {
     pub channels: Vec<Channel>,
     /// File formats; empty renders and reads back without encoding.
     pub format: Vec<ImageFormat>,
+    /// Which clock every written stamp is on.
+    pub stamps: Stamps,
+    /// With `stamps = "zero"`: what that clock shows at the beginning of the window, nanoseconds.
+    pub epoch_ns: u64,
     /// Pixel type of EXR colour.
     pub exr_pixel: ExrPixel,
     /// EXR compression.
@@ -358,8 +370,32 @@ impl Default for OutputSpec {
         Self {
             channels: vec![Channel::Color],
             format: vec![ImageFormat::Exr],
+            stamps: Stamps::Log,
+            epoch_ns: 0,
             exr_pixel: ExrPixel::Half,
             exr_compression: ExrCompression::Zip1,
+        }
+    }
+}
+
+/// Clocks of stamps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stamps {
+    /// The log's own.
+    #[default]
+    Log,
+    /// One that shows [`OutputSpec::epoch_ns`] at the beginning of `flight.window_s`.
+    Zero,
+}
+
+impl OutputSpec {
+    /// What written stamps show at path time 0, nanoseconds: there the log's clock shows `log_epoch_ns`, and the window begins at `start_s` of path time.
+    #[must_use]
+    pub fn stamp_epoch_ns(&self, log_epoch_ns: i64, start_s: f64) -> i64 {
+        match self.stamps {
+            Stamps::Log => log_epoch_ns,
+            Stamps::Zero => i64::try_from(self.epoch_ns).unwrap_or(i64::MAX).saturating_sub((start_s * 1e9).round() as i64),
         }
     }
 }

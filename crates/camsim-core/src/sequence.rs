@@ -11,7 +11,7 @@ pub struct Sequence {
     pub scenario: Scenario,
     /// Camera pose at any instant; its time is seconds since the first good row of the log (after `flight.speed`).
     pub path: Arc<CameraPath>,
-    /// Log clock at path time 0, nanoseconds.
+    /// What written stamps show at path time 0, nanoseconds: the log's clock, or that of `output.stamps`.
     pub epoch_ns: i64,
     /// Path time of frame 0's period, seconds (the beginning of `flight.window_s`).
     pub start_s: f64,

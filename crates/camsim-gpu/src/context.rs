@@ -12,6 +12,16 @@ pub enum GpuError {
         "no usable graphics adapter found{0}: install a Vulkan driver (on Debian or Ubuntu without a GPU: `apt-get install mesa-vulkan-drivers libvulkan1`), or set CAMSIM_ADAPTER to part of an adapter's name from `camsim info`"
     )]
     NoAdapter(String),
+    /// There are adapters, but none of this name.
+    #[error(
+        "no adapter has `{wanted}` in its name (CAMSIM_ADAPTER): there is {there}; set CAMSIM_ADAPTER to part of one of these names, or not at all"
+    )]
+    UnknownAdapter {
+        /// As in the environment.
+        wanted: String,
+        /// What there is, in words.
+        there: String,
+    },
     /// The adapter would not give a device.
     #[error("adapter `{adapter}` gave no device: {reason}")]
     NoDevice {
@@ -136,8 +146,21 @@ pub fn adapters(choice: AdapterChoice) -> Vec<AdapterSummary> {
     ranked(choice).iter().map(|adapter| AdapterSummary::of(&adapter.get_info())).collect()
 }
 
+/// Nothing to run on, or nothing of the name that is wanted.
+fn none_found(choice: AdapterChoice) -> GpuError {
+    let Ok(wanted) = std::env::var("CAMSIM_ADAPTER") else { return GpuError::NoAdapter(String::new()) };
+    let there: Vec<String> = named(choice, None).iter().map(|adapter| AdapterSummary::of(&adapter.get_info()).to_string()).collect();
+    if there.is_empty() {
+        return GpuError::NoAdapter(format!(" with CAMSIM_ADAPTER={wanted}"));
+    }
+    GpuError::UnknownAdapter { wanted, there: there.join("; ") }
+}
+
 fn ranked(choice: AdapterChoice) -> Vec<wgpu::Adapter> {
-    let wanted = std::env::var("CAMSIM_ADAPTER").ok().map(|name| name.to_lowercase());
+    named(choice, std::env::var("CAMSIM_ADAPTER").ok().map(|name| name.to_lowercase()))
+}
+
+fn named(choice: AdapterChoice, wanted: Option<String>) -> Vec<wgpu::Adapter> {
     let rank = |info: &wgpu::AdapterInfo| match (info.device_type, choice) {
         (wgpu::DeviceType::Cpu, AdapterChoice::Software) => 0,
         (wgpu::DeviceType::DiscreteGpu, _) => 1,
@@ -191,8 +214,7 @@ impl GpuContext {
     pub fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let mut candidates = ranked(choice);
         if candidates.is_empty() {
-            let named = std::env::var("CAMSIM_ADAPTER").map_or(String::new(), |name| format!(" with CAMSIM_ADAPTER={name}"));
-            return Err(GpuError::NoAdapter(named));
+            return Err(none_found(choice));
         }
         let adapter = candidates.remove(0);
         let info = adapter.get_info();

@@ -322,6 +322,7 @@ fn layouts(key: PipelineKey, lists: Lists) -> [Vec<wgpu::BindGroupLayoutEntry>; 
 #[must_use]
 pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) -> FrameUniforms {
     let photometric = &scenario.camera.photometric;
+    let noise_seed = scenario.noise_seed();
     let (axis, lines, fields) = table_shape(&plan.shutter);
     let ned_from_key = DMat3::from_quat(plan.key_pose.ned_from_camera);
     let column = |i: usize| ned_from_key.col(i).as_vec3().extend(0.0).to_array();
@@ -362,7 +363,7 @@ pub fn frame_uniforms(plan: &FramePlan, scenario: &Scenario, coords_phase: f32) 
         light: photometric.light as f32,
         noise_sigma: photometric.noise_sigma as f32,
         vignette_thresholds: photometric.vignette_thresholds.map(|t| t as f32),
-        seed: [scenario.seed as u32, (scenario.seed >> 32) as u32],
+        seed: [noise_seed as u32, (noise_seed >> 32) as u32],
         frame_number: plan.frame as u32,
         mono: u32::from(is_mono(photometric.output)),
         key_position_ned_m: plan.key_pose.position_ned_m.as_vec3().extend(0.0).to_array(),

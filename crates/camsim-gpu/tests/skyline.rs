@@ -125,6 +125,9 @@ fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
         let mut engine = engine();
         engine.set_reverse_on(place);
         let done = common::render(&engine, &sequence, &[Channel::Color, Channel::Coords, Channel::Depth], 0);
+        let options = RenderOptions { channels: vec![Channel::Coords, Channel::Depth], max_samples: 1, ..RenderOptions::default() };
+        let exact = Oracle::new(sequence.clone()).expect("oracle").render(0, &options);
+        let (exact_coords, exact_depth_m) = (exact.coords.expect("asked for"), exact.depth_m.expect("asked for"));
         let (plan, coords, depth_m) = (&done.plan, done.frame.coords.expect("asked for"), done.frame.depth_m.expect("asked for"));
         let mut sky = 0;
         for i in (0..SIZE_PX[0] * SIZE_PX[1]).filter(|&i| depth_m[i as usize] == 0.0) {
@@ -136,6 +139,15 @@ fn coordinates_of_the_sky_are_its_own_whatever_is_beside_it() {
             let off_px = exact.distance(DVec2::new(f64::from(of_pixel[2]), f64::from(of_pixel[3])));
             // Single precision, of coordinates up to 500 px, and a path through few nodes.
             assert!(off_px < 0.01, "{place:?}, {exposure_ms} ms, ({x}, {y}): {off_px} px");
+            // In place of a point the ray's direction at its row's own mid-exposure, of length 1.
+            let pose = sequence.path.pose(plan.stamp_s + plan.shutter.dt_pixel_s(x, y));
+            let way = DVec3::new(f64::from(of_pixel[5]), f64::from(of_pixel[6]), f64::from(of_pixel[7]));
+            assert!((way - pose.ned_from_camera * uv.extend(1.0).normalize()).length() < 1e-6, "{way}");
+            let theirs = exact_coords[i as usize];
+            assert!(
+                exact_depth_m[i as usize] > 0.0 || (0..8).filter(|k| ![2, 3].contains(k)).all(|k| (of_pixel[k] - theirs[k]).abs() < 2e-6),
+                "{of_pixel:?} {theirs:?}"
+            );
             sky += 1;
         }
         assert!(sky > 5000, "{place:?}: {sky}");

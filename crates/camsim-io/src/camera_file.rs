@@ -95,15 +95,19 @@ pub struct ImportedCamera {
     pub notes: Vec<String>,
 }
 
-/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Paths in it stay as written.
+/// Reads a CAMERA.toml: the keys of a scenario's `[camera]` at its root. Paths in it are resolved against its folder.
 pub fn read_camera_toml(path: &Path) -> Result<CameraSpec, CameraFileError> {
     let text = read(path)?;
-    let spec: CameraSpec = toml::from_str(&text).map_err(|error| CameraFileError::Syntax {
+    let mut spec: CameraSpec = toml::from_str(&text).map_err(|error| CameraFileError::Syntax {
         path: path.to_owned(),
         line: error.span().map(|span| line_of(&text, span.start)),
         message: with_nearest_key(error.message()),
     })?;
     check(path, &spec)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for file in [&mut spec.photometric.vignette, &mut spec.zoom_track].into_iter().flatten() {
+        *file = folder.join(&*file);
+    }
     Ok(spec)
 }
 

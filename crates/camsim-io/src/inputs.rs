@@ -48,11 +48,14 @@ pub fn of_files(mut paths: Vec<PathBuf>) -> Inputs {
     paths.par_iter().map(|path| (path.display().to_string(), content(path))).collect()
 }
 
+/// What stands for the content of a file that cannot be read.
+pub(crate) const NOT_READABLE: &str = "not readable";
+
 /// Length and checksum, or that there is nothing to read.
 fn content(path: &Path) -> String {
     match checksum(path) {
         Ok((bytes, crc)) => format!("{bytes} bytes, CRC-32 {crc:08x}"),
-        Err(_) => "not readable".to_owned(),
+        Err(_) => NOT_READABLE.to_owned(),
     }
 }
 
@@ -80,7 +83,7 @@ fn checksum(path: &Path) -> io::Result<(u64, u32)> {
 #[must_use]
 pub fn dated(path: &Path) -> String {
     let of = path.metadata().and_then(|of| Ok((of.len(), of.modified()?)));
-    let Ok((bytes, modified)) = of else { return "not readable".to_owned() };
+    let Ok((bytes, modified)) = of else { return NOT_READABLE.to_owned() };
     let modified_s = modified.duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64());
     format!("{bytes} bytes, changed {modified_s:.6} s after 1970")
 }

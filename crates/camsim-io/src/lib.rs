@@ -28,6 +28,8 @@ pub mod write;
 
 pub mod inputs;
 
+pub mod portable;
+
 pub mod manifest;
 
 pub mod compare;

@@ -6,7 +6,7 @@ use camsim_core::{
     camera::CameraModel,
     flight_log::{FlightLog, HeightConversion},
     mount::{CameraPath, MountError},
-    scenario::{Auto, FlightSpec, HeightReference, Scenario, TrackerKind},
+    scenario::{Auto, CameraSpec, FieldOr, FlightSpec, HeightReference, Scenario, TrackerKind},
     sequence::Sequence,
     temporal::SAMPLES,
     tracker::{Tracked, TrackerError, track},
@@ -190,8 +190,8 @@ fn load_beside(scenario: &Scenario, before: Option<&Loaded>) -> Result<Loaded, L
     };
     let zoom_track = load_zoom_track(scenario, &log)?;
     let (start_s, frames) = frames_of_window(scenario, &log)?;
-    let sequence =
-        Sequence { scenario: scenario.clone(), path: Arc::new(path), epoch_ns: log.epoch_ns, start_s, frames, scene, vignette, zoom_track };
+    let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, start_s);
+    let sequence = Sequence { scenario: scenario.clone(), path: Arc::new(path), epoch_ns, start_s, frames, scene, vignette, zoom_track };
     let mut warnings = warnings(&sequence, &log, &tracked, terrain.as_ref());
     warnings.extend(scene_notes.iter().cloned());
     Ok(Loaded { sequence: Arc::new(sequence), log, tracked, terrain, warnings, scene_notes })
@@ -286,9 +286,29 @@ fn blind_share_warning(sequence: &Sequence) -> Option<String> {
     let share = 100.0 * f64::from(blind) / f64::from(all.max(1));
     (share >= 0.5).then(|| {
         format!(
-            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see `camsim lens CAMERA.toml check`"
+            "about {share:.0} % of the picture has no ray through the lens and stays empty (alpha 0): see `camsim lens SCENARIO.toml check`"
         )
     })
+}
+
+/// Times of the shutter that no sensor keeps at this frame rate. They are rendered as they stand.
+fn shutter_warnings(camera: &CameraSpec) -> Vec<String> {
+    let period_ms = 1e3 / camera.fps;
+    let shutter = &camera.shutter;
+    let interlace_ms = match shutter.interlace_ms {
+        FieldOr::Ms(ms) => ms,
+        FieldOr::Field => 0.0,
+    };
+    let longer = [
+        ("readout_ms", shutter.readout_ms, "the next frame would begin before this one is read"),
+        ("exposure_ms", shutter.exposure_ms, "a row would be exposed for two frames at once"),
+        ("interlace_ms", interlace_ms, "one field would belong to the frame before; \"field\" is half a period"),
+    ];
+    let told = |(key, ms, why): &(&str, f64, &str)| {
+        format!("camera.shutter.{key} = {ms} is longer than a frame's period of {period_ms:.3} ms (camera.fps = {}): {why}", camera.fps)
+    };
+    // To the hair, so that 33.3334 at 30 frames a second passes.
+    longer.iter().filter(|(_, ms, _)| *ms > 1.0001 * period_ms).map(told).collect()
 }
 
 fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Option<&TerrainSummary>) -> Vec<String> {
@@ -307,6 +327,7 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
             "quality.ideal_samples = {SAMPLES} is not followed: surfaces of the scene have holes by their pictures, or are mixed with what is behind them, and samples do not show such borders"
         ));
     }
+    warnings.extend(shutter_warnings(&sequence.scenario.camera));
     let fps = sequence.scenario.camera.fps;
     let outside = frames_outside(sequence);
     if outside > 0 {

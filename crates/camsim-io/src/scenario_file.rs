@@ -9,9 +9,12 @@ use camsim_core::scenario::{CameraSpec, Preset, Problem, Scenario, validate, val
 use thiserror::Error;
 
 pub(crate) mod check;
+mod mistaken;
+mod paths;
 pub(crate) mod schema;
 pub(crate) mod tree;
 
+pub(crate) use paths::for_each_path;
 pub use schema::Kind;
 use tree::Tree;
 

@@ -15,7 +15,8 @@ use crate::{
 /// Measure run time against error on this machine: every case with every method
 ///
 /// Times are of frames rendered and read back, methods in turn within the same rounds; errors are against the exact reference: of source
-/// coordinates in pixels, and of pictures in dB. The whole takes about a quarter of an hour on two processor cores without a GPU, --quick less than a minute.
+/// coordinates in pixels, and of pictures in dB. On two processor cores that do nothing else, without a GPU, the whole takes about a quarter of an hour and --quick about half a
+/// minute; beside other work it takes as much longer, and its times are worth as much less.
 /// Files are written after each case, so that an interrupted run leaves what it has measured; there is no resuming.
 /// Rows: case, preset, width, height, ms_per_frame_p50, ms_per_frame_p99, cpu_ms_per_frame, coord_rms_px, coord_p99_px, coord_max_px, psnr_db,
 /// predicted_px, and more behind them; null is what was not measured.

@@ -14,7 +14,7 @@ use crate::{
     failure::{Failure, OrFail},
     frame_source::Device,
     inputs::{self, ScenarioArgs},
-    render_run::{self, Job},
+    render_run::{self, Job, go_on},
 };
 
 /// Every n-th frame of the built-in flight is rendered: the turn shows in a few seconds of work.
@@ -42,10 +42,12 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let engine = Engine::new(AdapterChoice::Best)?;
     console.note(format_args!("rendering on {}", engine.gpu().adapter));
     let scene = builtin::unpack(&folder.join("scene")).or_failed()?;
-    let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read()?;
+    let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
-    let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
+    let go_on = go_on(folder);
+    let warnings = &loaded.warnings;
+    let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings, go_on: &go_on };
     let mut thumbnails = Vec::new();
     let every = (frames.len() / SHEET_FRAMES).max(1);
     let mut seen = 0;

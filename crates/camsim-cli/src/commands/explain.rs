@@ -11,7 +11,7 @@ use camsim_gpu::{
     ideal::host::draws,
     reverse::host::{self, ReverseOn},
 };
-use camsim_io::{load::Loaded, terrain::TerrainSummary};
+use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
 use serde::Serialize;
 
 use crate::{
@@ -19,6 +19,7 @@ use crate::{
     failure::{Failure, OrFail},
     frame_list::FrameListError,
     inputs::{self, ScenarioArgs},
+    render_run::source_frame,
 };
 
 /// Largest texture side that plans are made for here: every adapter of the last decade has it, and `explain` needs none.
@@ -46,9 +47,43 @@ struct Explained<'a> {
     terrain: Option<Terrain>,
     warnings: &'a [String],
     plan: PlanSummary<'a>,
+    source_frame: Source,
     level_of_detail: Option<LevelOfDetail>,
     models: Option<Models>,
     memory: Option<Memory>,
+}
+
+/// What the source coordinates x, y of `coords` are in, by the names that `frames.csv` has for it.
+#[derive(Serialize)]
+struct Source {
+    ideal_width_px: u32,
+    ideal_height_px: u32,
+    ideal_fx_px: f64,
+    ideal_fy_px: f64,
+    ideal_cx_px: f64,
+    ideal_cy_px: f64,
+    ideal_t_ns: i64,
+    ideal_ned_m: [f64; 3],
+    /// ned_from_camera.
+    ideal_q_wxyz: [f64; 4],
+}
+
+impl Source {
+    fn of(frame: &SourceFrame) -> Self {
+        let SourceFrame { size_px, focal_px, principal_px, t_ns, pose } = *frame;
+        let q = pose.ned_from_camera;
+        Self {
+            ideal_width_px: size_px[0],
+            ideal_height_px: size_px[1],
+            ideal_fx_px: focal_px[0],
+            ideal_fy_px: focal_px[1],
+            ideal_cx_px: principal_px[0],
+            ideal_cy_px: principal_px[1],
+            ideal_t_ns: t_ns,
+            ideal_ned_m: pose.position_ned_m.to_array(),
+            ideal_q_wxyz: [q.w, q.x, q.y, q.z],
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -117,7 +152,7 @@ struct Terrain {
 
 /// Loads the scenario and prints the plan of one frame.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let scenario = args.scenario.read()?;
+    let scenario = args.scenario.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames = loaded.sequence.frames;
     if args.frame >= frames {
@@ -133,6 +168,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let level_of_detail = level_of_detail(&loaded.sequence, &plan);
     let models = models(&loaded.sequence, &plan);
     let memory = memory(&loaded.sequence, &plan);
+    let source_frame = Source::of(&source_frame(&loaded.sequence, &plan));
     let tracked = &loaded.tracked;
     let tracker = Tracker { rate_hz: tracked.rate_hz, limits: tracked.limits, saturation: tracked.saturation };
     if args.json {
@@ -144,6 +180,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
             terrain,
             warnings,
             plan: plan.summary(),
+            source_frame,
             level_of_detail,
             models,
             memory,
@@ -163,6 +200,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     print_light(&loaded, console)?;
     console.line(format_args!("sequence of {frames} frames"))?;
     console.print(&plan.to_string())?;
+    print_source(&source_frame, &plan, console)?;
     if let Some(part) = part_of_host(&loaded.sequence, &plan) {
         console.line(format_args!("on a software adapter the host {part} of this frame (`camsim info --help`)"))?;
     }
@@ -269,6 +307,22 @@ fn print_terrain(terrain: &Terrain, console: &mut Console<'_>) -> Result<(), Fai
         "  {voids} heights missing, {outside} outside of the ortho-image, {} triangles at the finest level",
         terrain.finest_triangles
     ))?;
+    Ok(())
+}
+
+/// What x and y of `coords` are in.
+fn print_source(source: &Source, plan: &FramePlan, console: &mut Console<'_>) -> Result<(), Failure> {
+    let Source { ideal_width_px, ideal_height_px, ideal_fx_px, ideal_fy_px, ideal_cx_px, ideal_cy_px, ideal_t_ns, .. } = source;
+    console.line(format_args!(
+        "source coordinates (x, y of coords) are in a frame of {ideal_width_px}x{ideal_height_px} px, focal length {ideal_fx_px:.6}, {ideal_fy_px:.6}, principal point {ideal_cx_px:.6}, {ideal_cy_px:.6} px"
+    ))?;
+    let ([n, e, d], [w, x, y, z]) = (source.ideal_ned_m, source.ideal_q_wxyz);
+    console.line(format_args!(
+        "  of a pinhole at NED {n:.6}, {e:.6}, {d:.6} m, ned_from_camera w {w:.9}, x {x:.9}, y {y:.9}, z {z:.9}, stamp {ideal_t_ns} ns"
+    ))?;
+    if plan.shared_by.is_some() {
+        console.line("  which is this frame's own, though several are made from one ideal frame")?;
+    }
     Ok(())
 }
 

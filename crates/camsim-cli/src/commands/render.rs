@@ -23,8 +23,9 @@ use crate::{
 
 /// Render the frames of a scenario
 ///
-/// Writes a folder with the frames, camera.toml, trajectory.csv, frames.csv (stamp, pose and files of each frame) and run.json, by which
-/// the run can be repeated.
+/// Writes a folder with the frames, camera.toml, trajectory.csv (of the platform), camera_trajectory.csv (with mount and vibration), frames.csv (stamp, pose,
+/// ideal frame and files of each frame) and run.json, by which the run can be repeated: `camsim render DIR/run.json`. Paths in these files are relative to
+/// them, so that a folder can be moved together with what it names. Ctrl-C ends after the frames that are under way, and says how to go on.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,7 +40,7 @@ Examples:
                                                       how fast, and where the time goes
   camsim render --print-default > flight.toml         a scenario to begin with")]
 pub struct Args {
-    /// Scenario (TOML)
+    /// Scenario (TOML), or the run.json of an earlier run
     #[arg(required_unless_present = "print_default")]
     scenario: Option<PathBuf>,
     /// Output folder; the scenario's name + "-frames" if left out
@@ -108,7 +109,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         return Ok(console.print(&print_default())?);
     };
     let folder = args.output.clone().unwrap_or_else(|| default_folder(&path));
-    let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read()?;
+    let scenario = ScenarioArgs { scenario: path, changes: args.changes.clone() }.read(console)?;
     let scenario = with_backend(with_outputs(scenario, args)?, args.backend)?;
     let mut times = TimesTable::default();
     let is_quiet = console.is_quiet();
@@ -117,6 +118,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         None => (0..loaded.sequence.frames).collect(),
         Some(list) => list.resolve(loaded.sequence.frames).or_bad_input()?,
     };
+    let go_on = console.command_with("--resume");
     let job = Job {
         sequence: &loaded.sequence,
         folder: &folder,
@@ -124,6 +126,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
         shard: args.shard,
         resume: args.resume,
         warnings: &loaded.warnings,
+        go_on: &go_on,
     };
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if scenario.quality.solver == Auto::Value(Solver::Oracle) {
@@ -143,7 +146,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     };
     let outcome = render_run::run(&job, &mut *source, console, &mut look).inspect_err(|failure| {
         if failure.code() == FAILED && folder.join("run.json").is_file() {
-            console.note("frames that are written stay as they are: --resume goes on with the others");
+            console.note(format_args!("frames that are written stay as they are; to go on with the others: {go_on}"));
         }
     })?;
     if !console.is_quiet() {

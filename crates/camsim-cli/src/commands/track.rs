@@ -4,10 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use camsim_core::{
+    mount::CameraPath,
+    scenario::Scenario,
     tracker::{Channels, Hold, MotionUse, ResolvedLimits, Saturation, TrackReport, Tracked},
     trajectory::Trajectory,
 };
-use camsim_io::write::trajectory_csv;
+use camsim_io::write::{camera_trajectory_csv, trajectory_csv};
 use serde::Serialize;
 
 use crate::{
@@ -15,7 +17,7 @@ use crate::{
     failure::{Failure, OrFail},
     inputs::{self, ScenarioArgs},
     output::write_output,
-    render_run,
+    render_run::{body_at, camera_at},
 };
 
 /// Rows that a trajectory file may have: the table is made in memory, about 300 bytes a row.
@@ -24,15 +26,21 @@ const MOST_ROWS: f64 = 10e6;
 /// Follow the flight log and print the motion, without pictures
 ///
 /// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz (body rates, rad/s),
-/// alphax,alphay,alphaz (rad/s^2). t_s is as in the log.
+/// alphax,alphay,alphaz (rad/s^2); with --of camera t_s,n_m,e_m,d_m, vn,ve,vd, qw,qx,qy,qz (ned_from_camera), wx,wy,wz (in optical axes): the optical
+/// centre with lever arm, mount and vibration. Rows are those of flight.window_s, its first and last instant among them; all of the log without one.
+/// t_s is as in the log, or as output.stamps says. The report is of the whole log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
   camsim track flight.toml -o traj.csv
+  camsim track flight.toml --of camera --rate 1000 -o poses.csv
   camsim track flight.toml --report --set tracker.kind=spline")]
 pub struct Args {
     #[command(flatten)]
     scenario: ScenarioArgs,
+    /// Whose motion
+    #[arg(long, value_enum, default_value = "body")]
+    of: Of,
     /// Rows a second; tracker.rate_hz if left out
     #[arg(long, value_name = "HZ")]
     rate: Option<f64>,
@@ -45,6 +53,14 @@ pub struct Args {
     /// Print the report as JSON
     #[arg(long, requires = "report")]
     json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Of {
+    /// The platform, which the log is of
+    Body,
+    /// The camera on it, with lever arm, mount and vibration
+    Camera,
 }
 
 #[derive(Serialize)]
@@ -63,15 +79,22 @@ const SHOWN_HOLDS: usize = 10;
 
 /// Tracks the log, writes the motion, prints the report.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let scenario = args.scenario.read()?;
+    let scenario = args.scenario.read(console)?;
     let (log, tracked) = inputs::load_flight_only(&scenario, console)?;
     let rate_hz = args.rate.unwrap_or(scenario.tracker.rate_hz);
-    let rows = row_count(&tracked.trajectory, rate_hz)?;
+    let span_s = span_s(&scenario, &tracked.trajectory);
+    let rows = row_count(span_s, rate_hz)?;
     if args.output.is_some() || !args.report {
-        let trajectory = &tracked.trajectory;
-        let last_s = trajectory.span_s().0 + (rows - 1) as f64 / rate_hz;
-        let records = render_run::motion(trajectory, log.epoch_ns, rate_hz, [trajectory.span_s().0, last_s]);
-        let table = trajectory_csv(records);
+        let epoch_ns = scenario.output.stamp_epoch_ns(log.epoch_ns, window_start_s(&scenario));
+        let instants = (0..rows).map(|k| span_s[0] + k as f64 / rate_hz);
+        let table = match args.of {
+            Of::Body => trajectory_csv(instants.map(|t_s| body_at(&tracked.trajectory, epoch_ns, t_s))),
+            Of::Camera => {
+                let path = CameraPath::new(tracked.trajectory.clone(), &scenario.camera.mount).or_bad_input()?;
+                warn_of_few(&path, rate_hz, console);
+                camera_trajectory_csv(instants.map(|t_s| camera_at(&path, epoch_ns, t_s)))
+            }
+        };
         write_output(args.output.as_deref(), console, |out| out.write_all(table.as_bytes()))?;
     }
     if let Some(path) = &args.output {
@@ -84,8 +107,28 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-fn row_count(trajectory: &Trajectory, rate_hz: f64) -> Result<u64, Failure> {
-    let (start_s, end_s) = trajectory.span_s();
+/// Path time of the window's beginning.
+fn window_start_s(scenario: &Scenario) -> f64 {
+    scenario.flight.window_s.map_or(0.0, |[start_s, _]| start_s / scenario.flight.speed)
+}
+
+/// The window, or all of the log.
+fn span_s(scenario: &Scenario, trajectory: &Trajectory) -> [f64; 2] {
+    let all = trajectory.span_s();
+    scenario.flight.window_s.map_or([all.0, all.1], |window| window.map(|t_s| t_s / scenario.flight.speed))
+}
+
+fn warn_of_few(path: &CameraPath, rate_hz: f64, console: &mut Console<'_>) {
+    let vibration_hz = path.highest_vibration_hz();
+    if vibration_hz > 0.5 * rate_hz {
+        console.warn(format_args!(
+            "{rate_hz} rows a second are too few to show the mount's vibration of {vibration_hz} Hz: give --rate {:.0} or more",
+            8.0 * vibration_hz
+        ));
+    }
+}
+
+fn row_count([start_s, end_s]: [f64; 2], rate_hz: f64) -> Result<u64, Failure> {
     let rows = ((end_s - start_s) * rate_hz + 1e-6).floor() + 1.0;
     if !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return Err(Failure::bad_input(anyhow!("--rate {rate_hz}: must be a finite number of hertz above 0")));
@@ -175,9 +218,10 @@ mod tests {
     #[test]
     fn hopeless_rates_are_refused() {
         let trajectory = Trajectory::listed(vec![0.0], 10.0, vec![still()]).unwrap();
-        assert_eq!(row_count(&trajectory, 10.0).unwrap(), 101);
+        let span_s = <[f64; 2]>::from(trajectory.span_s());
+        assert_eq!(row_count(span_s, 10.0).unwrap(), 101);
         for rate_hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e300] {
-            assert_eq!(row_count(&trajectory, rate_hz).unwrap_err().code(), crate::failure::BAD_INPUT, "{rate_hz}");
+            assert_eq!(row_count(span_s, rate_hz).unwrap_err().code(), crate::failure::BAD_INPUT, "{rate_hz}");
         }
     }
 }

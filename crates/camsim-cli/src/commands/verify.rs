@@ -164,7 +164,7 @@ impl From<ErrorStats> for Figures {
 
 /// Measures and compares.
 pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
-    let scenario = args.scenario.read()?;
+    let scenario = args.scenario.read(console)?;
     if scenario.quality.solver == Auto::Value(Solver::Oracle) {
         return Err(Failure::bad_input(anyhow!(
             "quality.solver is \"oracle\", which is what plans are verified against: leave it out, or add --set quality.solver=auto"

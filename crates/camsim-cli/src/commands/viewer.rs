@@ -11,7 +11,7 @@ use crate::{
     console::Console,
     failure::{Failure, OrFail},
     frame_source::{Device, FrameSource, Rays},
-    render_run::{self, Job},
+    render_run::{self, Job, go_on},
 };
 
 /// Open the viewer
@@ -36,7 +36,9 @@ pub fn export(job: &ExportJob) -> Result<String, Failure> {
     let [first, end] = job.frames;
     let frames: Vec<u64> = (first..end.min(loaded.sequence.frames)).collect();
     let folder = &job.folder;
-    let run = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings: &loaded.warnings };
+    let go_on = go_on(folder);
+    let warnings = &loaded.warnings;
+    let run = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings, go_on: &go_on };
     let engine;
     let mut source: Box<dyn FrameSource + '_> = if job.scenario.quality.solver == Auto::Value(Solver::Oracle) {
         Box::new(Rays::new(&loaded.sequence)?)

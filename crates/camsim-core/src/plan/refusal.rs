@@ -16,7 +16,7 @@ pub enum PlanError {
     Shutter(#[from] ShutterError),
     /// No pixel has a pre-image.
     #[error(
-        "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens CAMERA.toml check`)"
+        "no pixel of the camera has an ideal ray: check camera.lens.coefficients and camera.focal_px (`camsim lens SCENARIO.toml check`)"
     )]
     NoRay,
     /// The ideal frame would have too many pixels for any memory, though its sides fit.

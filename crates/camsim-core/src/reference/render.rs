@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{FrameView, Look, Oracle};
 use crate::{
-    frame::{COORDS_CHANNELS, RenderedFrame, RowRecord},
+    frame::{COORDS_CHANNELS, RenderedFrame, RowRecord, sky_direction_ned},
     noise::tail_table,
     photometric::photometric,
     pose::CameraPose,
@@ -259,14 +259,15 @@ impl Job<'_> {
                 _ => 1.0,
             }
         });
-        photometric(spec, color, weight as f32, pixel, self.frame as u32, sequence.scenario.seed, &self.noise_table)
+        photometric(spec, color, weight as f32, pixel, self.frame as u32, sequence.scenario.noise_seed(), &self.noise_table)
     }
 
     fn coords(&self, pixel: [u32; 2], look: &Look) -> [f32; COORDS_CHANNELS] {
         let source_px = self.options.key.map_or(DVec2::ZERO, |key| key.source_px(look));
         let dt_s = self.oracle.clock.dt_s(pixel);
-        let point = look.hit.map_or(DVec3::ZERO, |hit| hit.point_ned_m);
-        [look.uv.x, look.uv.y, source_px.x, source_px.y, dt_s, point.x, point.y, point.z].map(|value| value as f32)
+        // Of the sky, which has no point, the direction.
+        let way = look.hit.map_or_else(|| sky_direction_ned(&look.pose, look.uv), |hit| hit.point_ned_m);
+        [look.uv.x, look.uv.y, source_px.x, source_px.y, dt_s, way.x, way.y, way.z].map(|value| value as f32)
     }
 }
 

@@ -10,6 +10,9 @@ use super::FieldOr;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CameraSpec {
+    /// Which camera this is: part of the seed of its noise ([`crate::noise::camera_seed`]), so that cameras on one platform do not share theirs.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub name: String,
     /// Width and height of the output.
     pub size_px: [u32; 2],
     /// Focal lengths (fx, fy).
@@ -40,6 +43,7 @@ pub struct CameraSpec {
 impl Default for CameraSpec {
     fn default() -> Self {
         Self {
+            name: String::new(),
             size_px: [640, 480],
             focal_px: [500.0, 500.0],
             principal_point_px: None,
@@ -68,7 +72,8 @@ pub struct MountSpec {
     pub vibration: Vec<VibrationSpec>,
 }
 
-/// One sinusoid `amplitude * sin(2 pi hz t + phase)` on one mount axis; t in log seconds.
+/// One sinusoid `amplitude * sin(2 pi hz t + phase)` about or along one body axis, before the mount; t in seconds of flight since the log's first
+/// good row, whatever the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VibrationSpec {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, TrackerSpec};
+use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, Stamps, TrackerSpec};
 use crate::{plan::MAX_KEYS, temporal::SAMPLES};
 
 mod scene;
@@ -234,6 +234,12 @@ fn check_quality_and_output(check: &mut Check, scenario: &Scenario) {
     });
     check.require(!scenario.output.channels.is_empty(), "output.channels", || {
         "is empty; name what to write, for example [\"color\"] (to encode nothing, write format = [])".into()
+    });
+    check.require(scenario.output.epoch_ns == 0 || scenario.output.stamps == Stamps::Zero, "output.epoch_ns", || {
+        "is what stamps begin with where they do not follow the log: write output.stamps = \"zero\" too, or leave it out".into()
+    });
+    check.require(i64::try_from(scenario.output.epoch_ns).is_ok(), "output.epoch_ns", || {
+        format!("must be at most {} nanoseconds: stamps have 64 bits and a sign", i64::MAX)
     });
 }
 

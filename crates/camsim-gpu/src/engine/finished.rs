@@ -76,13 +76,14 @@ impl Session<'_> {
             exact_truth::complete(truth, &color_rgba, &self.planner, &plan, f64::from(self.coords_phase));
         }
         let size_px = plan.camera.size_px;
+        let coords = truth.as_ref().map(|truth| coords(truth, &color_rgba, &plan, &self.planner.sequence().path));
         let frame = RenderedFrame {
             index: plan.frame,
             stamp_ns: self.planner.sequence().epoch_ns.saturating_add((plan.stamp_s * 1e9).round() as i64),
             size_px,
             color_rgba,
             depth_m: truth.as_ref().map(|truth| truth.iter().map(|t| t.depth_m).collect()),
-            coords: truth.as_ref().map(|truth| coords(truth, &plan)),
+            coords,
             rows: self.planner.rows(&plan),
         };
         times.read_ms = ms_since(begun);

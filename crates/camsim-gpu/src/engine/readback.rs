@@ -6,7 +6,14 @@ use std::{
     thread::{Builder, available_parallelism},
 };
 
-use camsim_core::plan::FramePlan;
+use camsim_core::{
+    frame::{COORDS_CHANNELS, sky_direction_ned},
+    mount::CameraPath,
+    plan::FramePlan,
+    pose::CameraPose,
+};
+use glam::DVec2;
+use rayon::prelude::*;
 
 use crate::{
     context::{GpuContext, GpuError},
@@ -80,15 +87,26 @@ fn copied<T: bytemuck::Pod>(bytes: &[u8]) -> Vec<T> {
     values
 }
 
-/// What the shader wrote beside the picture, with each pixel's time shift.
-pub(super) fn coords(truth: &[Truth], plan: &FramePlan) -> Vec<[f32; 8]> {
-    let width = plan.camera.size_px[0];
-    let dt_s = |i: u32| plan.shutter.dt_pixel_s(i % width, i / width) as f32;
-    truth
-        .iter()
-        .zip(0..)
-        .map(|(t, i)| [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s(i), t.point_ned_m[0], t.point_ned_m[1], t.point_ned_m[2]])
-        .collect()
+/// What was found beside the picture, with each pixel's time shift, and the direction of the sky where there is a ray (alpha) and nothing that it meets.
+pub(super) fn coords(truth: &[Truth], color_rgba: &[f32], plan: &FramePlan, path: &CameraPath) -> Vec<[f32; COORDS_CHANNELS]> {
+    let width = plan.camera.size_px[0] as usize;
+    let of_row = |(y, (row, alphas)): (usize, (&[Truth], &[f32]))| {
+        // Where lines are rows, all pixels of one look at one instant.
+        let mut last: Option<(f64, CameraPose)> = None;
+        let of_pixel = |(x, (t, rgba)): (usize, (&Truth, &[f32]))| {
+            let dt_s = plan.shutter.dt_pixel_s(x as u32, y as u32);
+            let [mut n, mut e, mut d] = t.point_ned_m;
+            if t.depth_m == 0.0 && rgba[3] > 0.0 {
+                let pose = last.filter(|(of_s, _)| *of_s == dt_s).map_or_else(|| path.pose(plan.stamp_s + dt_s), |(_, pose)| pose);
+                last = Some((dt_s, pose));
+                let uv = DVec2::new(f64::from(t.uv[0]), f64::from(t.uv[1]));
+                [n, e, d] = sky_direction_ned(&pose, uv).as_vec3().to_array();
+            }
+            [t.uv[0], t.uv[1], t.source_px[0], t.source_px[1], dt_s as f32, n, e, d]
+        };
+        row.iter().zip(alphas.chunks_exact(4)).enumerate().map(of_pixel).collect::<Vec<_>>()
+    };
+    truth.par_chunks(width).zip(color_rgba.par_chunks(4 * width)).enumerate().flat_map_iter(of_row).collect()
 }
 
 /// All of a buffer.

@@ -86,6 +86,7 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("tracker.max_acceleration_m_s2", NumberOr(AUTO)),
     ("tracker.max_angular_rate_deg_s", NumberOr(AUTO)),
     ("tracker.max_angular_acceleration_deg_s2", NumberOr(AUTO)),
+    ("camera.name", Text),
     ("camera.size_px", Counts(2, MAX_SIDE_PX)),
     ("camera.focal_px", Numbers(2)),
     ("camera.principal_point_px", Numbers(2)),
@@ -176,6 +177,8 @@ pub(super) const KEYS: &[(&str, Kind)] = &[
     ("quality.silhouettes", Word(&["auto", "plain", "rays"])),
     ("output.channels", Words(&["color", "depth", "valid", "rows", "coords"])),
     ("output.format", Words(&["exr", "png"])),
+    ("output.stamps", Word(&["log", "zero"])),
+    ("output.epoch_ns", Whole),
     ("output.exr_pixel", Word(&["half", "float"])),
     ("output.exr_compression", Word(&["none", "rle", "zip1", "zip16", "piz"])),
 ];

@@ -69,6 +69,7 @@ fn every_key_of_the_structs_is_in_the_schema() {
     assert_eq!(scenario.scene.board, Some(BoardSpec { kind: Some(BoardKind::Chessboard), ..board(9, 6, 0.05) }));
     let saved = toml::to_string(&scenario).unwrap();
     assert_eq!(parse_scenario(&saved, Path::new("s.toml"), &[]).unwrap(), scenario, "a saved scenario reads back");
+    scenario.camera.name = "left".into();
     scenario.scene.board = Some(BoardSpec {
         target: Some("target.yaml".into()),
         kind: Some(BoardKind::Charuco),

@@ -11,7 +11,7 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use super::{ScenarioError, schema::KEYS};
+use super::{ScenarioError, mistaken::mistaken, schema::KEYS};
 
 /// Where a key was written.
 #[derive(Clone, Debug)]
@@ -20,8 +20,8 @@ pub(crate) enum Place {
     File(PathBuf, usize),
     /// `--set key=value`.
     Set(String),
-    /// A run.json.
-    Run(PathBuf),
+    /// A run.json; whether its paths are relative to it, or to the working directory as those of early versions.
+    Run(PathBuf, bool),
 }
 
 impl fmt::Display for Place {
@@ -29,7 +29,7 @@ impl fmt::Display for Place {
         match self {
             Self::File(file, line) => write!(f, "{}:{line}", file.display()),
             Self::Set(text) => write!(f, "--set {text}"),
-            Self::Run(file) => write!(f, "{}", file.display()),
+            Self::Run(file, _) => write!(f, "{}", file.display()),
         }
     }
 }
@@ -50,11 +50,14 @@ impl Tree {
         Self::parse(text.strip_prefix('\u{feff}').unwrap_or(text), path, prefix)
     }
 
-    /// Reads a scenario, or the one that a `run.json` holds: whose paths are those of the working directory, as they were.
+    /// Reads a scenario, or the one that a `run.json` holds.
     pub(crate) fn read_scenario(path: &Path) -> Result<Self, ScenarioError> {
-        let begins = std::fs::read(path).ok().and_then(|bytes| bytes.trim_ascii_start().first().copied());
+        let bytes = std::fs::read(path).unwrap_or_default();
+        if let Some(what) = mistaken(path, &bytes) {
+            return Err(ScenarioError::Problems(vec![what]));
+        }
         // No TOML file begins so.
-        if begins == Some(b'{') { Self::read_run(path) } else { Self::read(path, "") }
+        if bytes.trim_ascii_start().first() == Some(&b'{') { Self::read_run(path) } else { Self::read(path, "") }
     }
 
     fn read_run(path: &Path) -> Result<Self, ScenarioError> {
@@ -66,7 +69,8 @@ impl Tree {
                 "JSON without `scenario`: of JSON files only the run.json that `camsim render` writes holds a scenario".into(),
             ));
         };
-        let places = root.keys().map(|key| (key.clone(), Place::Run(path.into()))).collect();
+        let is_portable = run.get("paths").and_then(serde_json::Value::as_str) == Some(crate::manifest::PATHS);
+        let places = root.keys().map(|key| (key.clone(), Place::Run(path.into(), is_portable))).collect();
         Ok(Self { file: path.into(), root, places })
     }
 
@@ -133,8 +137,8 @@ impl Tree {
     /// A path written at `key`, against the folder of its file; a path of `--set` stays relative to the working directory.
     pub(super) fn resolve(&self, key: &str, path: &str) -> PathBuf {
         match self.place(key) {
-            Place::File(file, _) => file.parent().unwrap_or(Path::new("")).join(path),
-            Place::Set(_) | Place::Run(_) => path.into(),
+            Place::File(file, _) | Place::Run(file, true) => file.parent().unwrap_or(Path::new("")).join(path),
+            Place::Set(_) | Place::Run(_, false) => path.into(),
         }
     }
 

@@ -52,6 +52,42 @@ impl FrameFiles {
         !names.is_empty() && names.iter().all(|(_, name)| self.folder.join(name).is_file())
     }
 
+    /// Removes the files of these frames, so that none of an earlier run is taken for one of the next.
+    ///
+    /// # Errors
+    /// A file that cannot be removed.
+    pub fn remove(&self, frames: &[u64]) -> Result<(), WriteError> {
+        for (_, name) in frames.iter().flat_map(|&index| self.names(index)) {
+            let path = self.folder.join(name);
+            match std::fs::remove_file(&path) {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => return Err(WriteError::Io { path, source }),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Files of frames in the folder, of any channel, that are not among those of `frames`: paths below the folder, in order.
+    pub fn others(&self, frames: &[u64]) -> Vec<String> {
+        let own: std::collections::HashSet<String> = frames.iter().flat_map(|&index| self.names(index)).map(|(_, name)| name).collect();
+        let mut others = Vec::new();
+        // A folder that cannot be read has nothing that could be mixed up.
+        for channel in std::fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+            let of_channel = channel.file_name().to_string_lossy().into_owned();
+            for file in std::fs::read_dir(channel.path()).into_iter().flatten().flatten() {
+                let name = file.file_name().to_string_lossy().into_owned();
+                let number = name.strip_prefix("frame_").and_then(|rest| rest.split_once('.')).map(|(number, _)| number);
+                let is_frame = number.is_some_and(|number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()));
+                let path = format!("{of_channel}/{name}");
+                if is_frame && !own.contains(&path) {
+                    others.push(path);
+                }
+            }
+        }
+        others.sort();
+        others
+    }
+
     /// Removes what a killed run left half written of these frames' files.
     pub fn sweep(&self, frames: &[u64]) {
         let names = frames.iter().flat_map(|&index| self.names(index));

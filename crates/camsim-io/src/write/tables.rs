@@ -1,50 +1,52 @@
-//! Tables: rows of a frame, frames of a sequence, the platform's trajectory, the camera.
+//! Tables: rows of a frame, the platform's trajectory, the camera's.
 
 use std::fmt::Write as _;
 
-use camsim_core::{frame::RowRecord, pose::BodyState, scenario::CameraSpec};
+use camsim_core::{
+    frame::RowRecord,
+    pose::{BodyState, CameraPose},
+};
 use glam::{DQuat, DVec3};
 
 /// Header of `rows/*.csv`; q = ned_from_camera.
 pub const ROWS_COLUMNS: &str = "row,t_mid_ns,n,e,d,qw,qx,qy,qz,vn,ve,vd";
 /// Header of `trajectory.csv` and of `camsim track`; q = ned_from_body, body rates in rad/s, t_s on the log's clock.
 pub const TRAJECTORY_COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,an,ae,ad,qw,qx,qy,qz,wx,wy,wz,alphax,alphay,alphaz";
-/// Header of `frames.csv`, before one column of file names for each file of a frame; the pose is the camera's at the stamp, q = ned_from_camera.
-pub const FRAMES_COLUMNS: &str = "frame,stamp_ns,n,e,d,qw,qx,qy,qz";
+/// Header of `camera_trajectory.csv` and of `camsim track --of camera`: the optical frame with lever arm, mount and vibration; q = ned_from_camera, rates in
+/// optical axes, rad/s.
+pub const CAMERA_TRAJECTORY_COLUMNS: &str = "t_s,n_m,e_m,d_m,vn,ve,vd,qw,qx,qy,qz,wx,wy,wz";
 
 /// One line of `trajectory.csv`.
 #[derive(Clone, Copy, Debug)]
 pub struct TrajectoryRecord {
-    /// Nanoseconds on the log's clock.
+    /// Nanoseconds on the clock of stamps.
     pub t_ns: i64,
     /// Motion of the platform.
     pub state: BodyState,
 }
 
-/// One line of `frames.csv`.
-#[derive(Clone, Debug)]
-pub struct FrameRecord {
-    /// Frame number.
-    pub frame: u64,
-    /// Stamp, nanoseconds on the log's clock.
-    pub stamp_ns: i64,
-    /// Optical centre in NED at the stamp.
-    pub position_ned_m: DVec3,
-    /// Takes optical camera coordinates to NED, at the stamp.
-    pub ned_from_camera: DQuat,
-    /// Column name and path below the output folder, the same columns in every record.
-    pub files: Vec<(String, String)>,
+/// One line of `camera_trajectory.csv`.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRecord {
+    /// Nanoseconds on the clock of stamps.
+    pub t_ns: i64,
+    /// Optical centre and attitude.
+    pub pose: CameraPose,
+    /// Of the optical centre, m/s.
+    pub velocity_ned_m_s: DVec3,
+    /// Relative to NED, in optical axes.
+    pub rate_camera_rad_s: DVec3,
 }
 
 /// Numbers in the shortest form that reads back to the same bits.
-fn push(line: &mut String, values: &[f64]) {
+pub(super) fn push(line: &mut String, values: &[f64]) {
     for value in values {
         // Writing to a String cannot fail.
         let _ = write!(line, ",{value}");
     }
 }
 
-fn wxyz(q: DQuat) -> [f64; 4] {
+pub(super) fn wxyz(q: DQuat) -> [f64; 4] {
     [q.w, q.x, q.y, q.z]
 }
 
@@ -83,29 +85,16 @@ pub fn trajectory_csv(records: impl IntoIterator<Item = TrajectoryRecord>) -> St
     text
 }
 
-/// `frames.csv`; the file columns are those of the first record.
-pub fn frames_csv(records: &[FrameRecord]) -> String {
-    let mut text = FRAMES_COLUMNS.to_owned();
-    for (column, _) in records.first().map_or(&[][..], |record| &record.files) {
-        let _ = write!(text, ",{column}");
-    }
-    text.push('\n');
-    for record in records {
-        let _ = write!(text, "{},{}", record.frame, record.stamp_ns);
-        push(&mut text, &record.position_ned_m.to_array());
-        push(&mut text, &wxyz(record.ned_from_camera));
-        for (_, file) in &record.files {
-            let _ = write!(text, ",{file}");
-        }
+/// `camera_trajectory.csv`.
+pub fn camera_trajectory_csv(records: impl IntoIterator<Item = CameraRecord>) -> String {
+    let mut text = format!("{CAMERA_TRAJECTORY_COLUMNS}\n");
+    for CameraRecord { t_ns, pose, velocity_ned_m_s, rate_camera_rad_s } in records {
+        text.push_str(&seconds(t_ns));
+        push(&mut text, &pose.position_ned_m.to_array());
+        push(&mut text, &velocity_ned_m_s.to_array());
+        push(&mut text, &wxyz(pose.ned_from_camera));
+        push(&mut text, &rate_camera_rad_s.to_array());
         text.push('\n');
     }
     text
-}
-
-/// `camera.toml`: a camera file that reads back to `camera`.
-///
-/// # Errors
-/// A value that TOML cannot hold (a path that is not Unicode).
-pub fn camera_toml(camera: &CameraSpec) -> Result<String, toml::ser::Error> {
-    Ok(format!("# The camera of this run: `camera = \"camera.toml\"` in a scenario uses it.\n{}", toml::to_string(camera)?))
 }

@@ -4,8 +4,8 @@ use std::{fs, path::Path};
 
 use camsim_core::{
     frame::{RenderedFrame, RowRecord},
-    pose::BodyState,
-    scenario::{CameraSpec, Channel, ExrCompression, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
+    pose::{BodyState, CameraPose},
+    scenario::{Channel, ExrCompression, ExrPixel, ImageFormat, OutputEncoding, OutputSpec},
 };
 use exr::prelude::read_first_flat_layer_from_file;
 use glam::{DQuat, DVec3};
@@ -39,6 +39,7 @@ fn everything(pixel: ExrPixel, compression: ExrCompression) -> OutputSpec {
         format: vec![ImageFormat::Exr, ImageFormat::Png],
         exr_pixel: pixel,
         exr_compression: compression,
+        ..OutputSpec::default()
     }
 }
 
@@ -192,18 +193,10 @@ fn tables_have_their_columns() {
     assert!(lines[1].starts_with("1403636579.763555584,1,2,3,0,") && lines[2].starts_with("-1.500000000,"));
     assert!(lines.iter().all(|line| line.split(',').count() == 20));
 
-    let record = FrameRecord {
-        frame: 4,
-        stamp_ns: 9,
-        position_ned_m: DVec3::ONE,
-        ned_from_camera: DQuat::IDENTITY,
-        files: FrameFiles::new(Path::new(""), &OutputSpec::default(), OutputEncoding::Srgb8).names(4),
-    };
-    assert_eq!(frames_csv(&[record]), "frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,color/frame_000004.exr\n");
-    assert_eq!(frames_csv(&[]), "frame,stamp_ns,n,e,d,qw,qx,qy,qz\n");
-
-    let camera: CameraSpec = toml::from_str(&camera_toml(&CameraSpec::default()).unwrap()).unwrap();
-    assert_eq!(camera, CameraSpec::default());
+    let pose = CameraPose { position_ned_m: DVec3::ONE, ned_from_camera: DQuat::IDENTITY };
+    let record = CameraRecord { t_ns: 500_000_000, pose, velocity_ned_m_s: DVec3::X, rate_camera_rad_s: DVec3::Z };
+    let text = camera_trajectory_csv([record]);
+    assert_eq!(text, format!("{CAMERA_TRAJECTORY_COLUMNS}\n0.500000000,1,1,1,1,0,0,1,0,0,0,0,0,1\n"));
 }
 
 #[test]

@@ -12,8 +12,9 @@ use camsim_core::{
 use camsim_io::{
     frame_file::{FrameSet, list::Entry},
     inputs,
-    manifest::{ResumeError, check_resume_of},
-    write::{FrameFiles, FrameWriter, camera_toml, write_atomic},
+    manifest::{PATHS, check_resume_of, portable_inputs},
+    portable::{relative_to, write_camera},
+    write::{FrameFiles, FrameWriter, write_atomic},
 };
 use serde::Serialize;
 
@@ -22,8 +23,10 @@ use crate::{
     console::Console,
     failure::{Failure, OrFail},
     frame_list::FrameListError,
+    interrupt::{self, Watch},
     output,
     progress::frames_bar,
+    render_run::{Lock, refuse_others, refuse_unknown},
 };
 
 /// Rows of a trajectory that are farther apart have a gap between them: as in flight logs.
@@ -38,10 +41,10 @@ pub enum Format {
     Png,
 }
 
-/// What the frames of a folder follow from; `--resume` goes on only with the same.
+/// What the frames of a folder follow from; `--resume` goes on only with the same. Paths are relative to the folder.
 #[derive(Debug, Serialize)]
-struct Inputs<'a> {
-    camera: &'a CameraSpec,
+struct Inputs {
+    camera: CameraSpec,
     /// FRAME.toml, as it is written.
     frame_toml: String,
     preset: String,
@@ -59,7 +62,8 @@ struct Inputs<'a> {
 #[derive(Debug, Serialize)]
 struct Manifest<'a> {
     version: &'static str,
-    apply: &'a Inputs<'a>,
+    paths: &'static str,
+    apply: &'a Inputs,
     /// First and one past the last.
     frames: [u64; 2],
     written: u64,
@@ -84,19 +88,28 @@ pub(super) fn run(
     check_motion(args, spec, set, &frames)?;
     tell_gaps(args, spec, set, &frames, console)?;
     let inputs = inputs(args, spec, set)?;
-    match check_resume_of(folder, "apply", "from other inputs", &inputs) {
-        Err(error) if args.resume => return Err(Failure::bad_input(error)),
-        Err(ResumeError::Differs { path, .. } | ResumeError::Parse { path, .. }) => {
-            console.warn(format_args!("{} is of other inputs: files of the same name are replaced, others stay", path.display()));
-        }
-        _ => {}
-    }
-    output::check_folder(folder)?;
     let files = FrameFiles::new(folder, &output_spec(args, set), spec.photometric.output);
     let number = |index: u64| args.frame_number.saturating_add(index);
+    let numbers: Vec<u64> = frames.iter().map(|&index| number(index)).collect();
+    let made = check_resume_of(folder, "apply", "from other inputs", &inputs);
+    let is_ours = matches!(made, Ok(true));
+    match made {
+        Ok(true) => {}
+        Ok(false) => refuse_unknown(folder, &numbers, &files, args.resume)?,
+        Err(error) if args.resume => return Err(Failure::bad_input(error)),
+        Err(error) => {
+            refuse_others(&numbers, &files, &error.what())?;
+            console.warn(format_args!("{} is of other inputs: its frames are replaced", folder.display()));
+        }
+    }
+    output::check_folder(folder)?;
+    if !is_ours {
+        files.remove(&numbers).or_failed()?;
+    }
     let todo: Vec<u64> = frames.iter().copied().filter(|&index| !(args.resume && files.exist(number(index)))).collect();
     let mut manifest = Manifest {
         version: env!("CARGO_PKG_VERSION"),
+        paths: PATHS,
         apply: &inputs,
         frames: [frames.first().copied().unwrap_or(0), frames.last().map_or(0, |last| last + 1)],
         written: 0,
@@ -105,17 +118,24 @@ pub(super) fn run(
     };
     write_manifest(args, &manifest)?;
     files.sweep(&todo.iter().map(|&index| number(index)).collect::<Vec<_>>());
-    write_atomic(&folder.join("camera.toml"), camera_toml(spec).or_failed()?.as_bytes()).or_failed()?;
-    // A resumed folder may hold frames beyond those asked for now.
-    let kept = |index: &u64| frames.binary_search(index).is_ok() || (args.resume && files.exist(number(*index)));
-    let kept: Vec<u64> = (0..set.entries().len() as u64).filter(kept).collect();
-    write_atomic(&folder.join("frames.csv"), &frames_csv(args, set, &files, &kept)?).or_failed()?;
+    write_camera(folder, spec).or_failed()?;
+    write_table(args, set, &files)?;
 
     let begin = std::time::Instant::now();
-    let unseen = render(args, spec, set, vignette, &todo, files, console)?;
-    manifest.written = todo.len() as u64;
-    manifest.finished = true;
+    let watch = interrupt::watch();
+    let rendered = render(args, spec, set, vignette, &todo, files.clone(), &watch, console);
+    // Rows are of what is there, from whichever run.
+    let told = write_table(args, set, &files);
+    manifest.written = todo.iter().filter(|&&index| files.exist(number(index))).count() as u64;
+    manifest.finished = rendered.is_ok() && !(watch.is_asked() && manifest.written < todo.len() as u64);
     write_manifest(args, &manifest)?;
+    let unseen = rendered?;
+    told?;
+    if !manifest.finished {
+        let done = manifest.written + manifest.skipped;
+        let go_on = console.command_with("--resume");
+        return Err(Failure::interrupted(anyhow!("{done} of {} frames are in {}; to go on: {go_on}", frames.len(), folder.display())));
+    }
     let (elapsed_s, skipped) = (begin.elapsed().as_secs_f64(), manifest.skipped);
     let skipped = if skipped > 0 { format!(" ({skipped} were there)") } else { String::new() };
     console.note(format_args!("{} frames{skipped} in {elapsed_s:.2} s in {}", todo.len(), folder.display()));
@@ -186,22 +206,28 @@ fn check_motion(args: &Args, spec: &CameraSpec, set: &FrameSet, frames: &[u64]) 
     Err(Failure::bad_input(anyhow!("{}: {bad} of {frames} frames, first frame {frame}: {error}; {covers}", args.frame.display())))
 }
 
-fn inputs<'a>(args: &Args, spec: &'a CameraSpec, set: &FrameSet) -> Result<Inputs<'a>, Failure> {
+fn inputs(args: &Args, spec: &CameraSpec, set: &FrameSet) -> Result<Inputs, Failure> {
+    let folder = &args.output;
     // Pictures are too many to be read for it.
-    let text = |path: &Path| format!("{} ({})", path.display(), inputs::dated(path));
+    let text = |path: &Path| format!("{} ({})", relative_to(path, folder).display(), inputs::dated(path));
+    let mut camera = spec.clone();
+    for path in [&mut camera.photometric.vignette, &mut camera.zoom_track].into_iter().flatten() {
+        *path = relative_to(path, folder);
+    }
+    let files = inputs::of_files(set.motion_file().into_iter().chain(spec.photometric.vignette.as_deref()).map(Path::to_owned).collect());
     let picture = |entry: &Entry| {
         let stamp = entry.stamp_ns.map_or("no stamp".to_owned(), |stamp_ns| format!("{stamp_ns} ns"));
         format!("{}, {}, {stamp}", text(&entry.color), entry.depth.as_deref().map_or("no depth".to_owned(), text))
     };
     Ok(Inputs {
-        camera: spec,
+        camera,
         frame_toml: std::fs::read_to_string(&args.frame).or_bad_input()?,
         preset: format!("{:?}", args.preset).to_lowercase(),
         solver: args.solver.map(|solver| format!("{solver:?}").to_lowercase()),
         blur_samples: args.blur_samples,
         seed: args.seed,
         frame_number: args.frame_number,
-        files: inputs::of_files(set.motion_file().into_iter().chain(spec.photometric.vignette.as_deref()).map(Path::to_owned).collect()),
+        files: portable_inputs(&files, folder),
         pictures: set.entries().iter().enumerate().map(|(index, entry)| (format!("{index:06}"), picture(entry))).collect(),
     })
 }
@@ -230,22 +256,28 @@ fn write_manifest(args: &Args, manifest: &Manifest<'_>) -> Result<(), Failure> {
     write_atomic(&args.output.join("run.json"), text.as_bytes()).or_failed()
 }
 
+/// `frames.csv` of all frames whose files are there.
+fn write_table(args: &Args, set: &FrameSet, files: &FrameFiles) -> Result<(), Failure> {
+    let _lock = Lock::take(&args.output)?;
+    let there: Vec<u64> = (0..set.entries().len() as u64).filter(|&index| files.exist(args.frame_number.saturating_add(index))).collect();
+    write_atomic(&args.output.join("frames.csv"), &frames_csv(args, set, files, &there)?).or_failed()
+}
+
 /// `frame,stamp_ns,from_color,from_depth`, then the files of each frame; what there is none of is empty.
 fn frames_csv(args: &Args, set: &FrameSet, files: &FrameFiles, frames: &[u64]) -> Result<Vec<u8>, Failure> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for (i, &index) in frames.iter().enumerate() {
+    let (columns, names) = (["frame", "stamp_ns", "from_color", "from_depth"], files.names(0));
+    writer.write_record(columns.into_iter().chain(names.iter().map(|(column, _)| column.as_str()))).or_failed()?;
+    let relative = |path: &Path| relative_to(path, &args.output).display().to_string();
+    for &index in frames {
         let Some(entry) = set.entries().get(index as usize) else { continue };
         let number = args.frame_number.saturating_add(index);
         let names = files.names(number);
-        if i == 0 {
-            let columns = ["frame", "stamp_ns", "from_color", "from_depth"];
-            writer.write_record(columns.into_iter().chain(names.iter().map(|(column, _)| column.as_str()))).or_failed()?;
-        }
         let own = [
             number.to_string(),
             entry.stamp_ns.map(|stamp_ns| stamp_ns.to_string()).unwrap_or_default(),
-            entry.color.display().to_string(),
-            entry.depth.as_deref().map(|depth| depth.display().to_string()).unwrap_or_default(),
+            relative(&entry.color),
+            entry.depth.as_deref().map(relative).unwrap_or_default(),
         ];
         writer.write_record(own.into_iter().chain(names.into_iter().map(|(_, name)| name))).or_failed()?;
     }
@@ -259,6 +291,7 @@ fn render(
     vignette: Option<&GrayImage>,
     todo: &[u64],
     files: FrameFiles,
+    watch: &Watch,
     console: &mut Console<'_>,
 ) -> Result<UnseenCounts, Failure> {
     // A frame is rendered on all cores; one thread beside them writes.
@@ -267,6 +300,9 @@ fn render(
     let mut unseen = UnseenCounts::default();
     let mut told = Vec::new();
     for &index in todo {
+        if watch.is_asked() {
+            break;
+        }
         let file = read(args, set, index as usize, console)?;
         for note in &file.notes {
             // Of one kind the first is enough: the next is of another file, with another number.

@@ -1,0 +1,130 @@
+//! What stands beside the frames: `camera.toml`, the trajectories, `frames.csv`.
+
+use std::collections::BTreeMap;
+
+use anyhow::anyhow;
+use camsim_core::{
+    mount::CameraPath,
+    plan::{FramePlan, Planner},
+    scenario::Scenario,
+    sequence::Sequence,
+    shutter::Shutter,
+    trajectory::Trajectory,
+};
+use camsim_io::{
+    portable::write_camera,
+    write::{
+        CameraRecord, FrameFiles, FrameRecord, FrameTable, SourceFrame, TrajectoryRecord, camera_trajectory_csv, frames_path,
+        trajectory_csv, write_atomic,
+    },
+};
+
+use super::Job;
+use crate::{
+    console::Console,
+    failure::{Failure, OrFail},
+};
+
+/// Rows of `trajectory.csv`: seven hours at 400 Hz, 3 GB.
+const MOST_TRAJECTORY_ROWS: f64 = 10e6;
+
+/// `camera.toml` and the trajectories, which the scenario alone decides.
+pub fn write_fixed(job: &Job<'_>, planner: &Planner, console: &mut Console<'_>) -> Result<(), Failure> {
+    let sequence = job.sequence;
+    let Scenario { camera, tracker, .. } = &sequence.scenario;
+    write_camera(job.folder, camera).or_failed()?;
+    let rate_hz = tracker.rate_hz;
+    let rows = (planner.stamp_s(sequence.frames - 1) - planner.stamp_s(0)) * rate_hz;
+    if rows > MOST_TRAJECTORY_ROWS {
+        return Err(Failure::bad_input(anyhow!(
+            "trajectory.csv would have {rows:.0} rows, more than {MOST_TRAJECTORY_ROWS:.0}: make flight.window_s shorter or tracker.rate_hz lower"
+        )));
+    }
+    let (first_s, last_s) = Shutter::from_spec(&camera.shutter, camera.fps, camera.size_px).or_bad_input()?.window_s();
+    let seen_s = [planner.stamp_s(0) + first_s, planner.stamp_s(sequence.frames - 1) + last_s];
+    let ticks = || ticks(&sequence.path.trajectory, rate_hz, seen_s);
+    let body = trajectory_csv(ticks().map(|t_s| body_at(&sequence.path.trajectory, sequence.epoch_ns, t_s)));
+    write_atomic(&job.folder.join("trajectory.csv"), body.as_bytes()).or_failed()?;
+    let optical = camera_trajectory_csv(ticks().map(|t_s| camera_at(&sequence.path, sequence.epoch_ns, t_s)));
+    write_atomic(&job.folder.join("camera_trajectory.csv"), optical.as_bytes()).or_failed()?;
+    let vibration_hz = sequence.path.highest_vibration_hz();
+    if vibration_hz > 0.5 * rate_hz {
+        console.warn(format_args!(
+            "camera_trajectory.csv has {rate_hz} rows a second, too few to show the mount's vibration of {vibration_hz} Hz (frames have it exactly): \
+             `camsim track SCENARIO.toml --of camera --rate {:.0} -o poses.csv` writes more",
+            8.0 * vibration_hz
+        ));
+    }
+    Ok(())
+}
+
+/// Rows of `frames.csv` that are in the folder, of this scenario.
+pub fn begin_frames(job: &Job<'_>, is_ours: bool) -> Result<(), Failure> {
+    let path = frames_path(job.folder);
+    let mut table = if is_ours { FrameTable::read(&path) } else { FrameTable::default() };
+    table.keep_what_is_in(job.folder, &|_| false);
+    table.write(&path).or_failed()
+}
+
+/// Brings `frames.csv` up to what is there: rows of other runs stay with their files, `made` are this run's, and frames whose run never came to write their
+/// rows get them from their plans. Without any file of frames (`format = []`) the rows are those of the frames rendered.
+pub fn end_frames(job: &Job<'_>, files: &FrameFiles, planner: &Planner, made: &BTreeMap<u64, SourceFrame>) -> Result<(), Failure> {
+    let path = frames_path(job.folder);
+    let mut table = FrameTable::read(&path);
+    let writes = !job.sequence.scenario.output.format.is_empty();
+    for (&frame, source) in made.iter().filter(|(frame, _)| !writes || files.exist(**frame)) {
+        table.insert(&record(job.sequence, files, planner, frame, *source));
+    }
+    for frame in (0..job.sequence.frames).filter(|&frame| writes && files.exist(frame) && !made.contains_key(&frame)) {
+        if !table.has_files(frame, &files.names(frame)) {
+            let plan = planner.plan(frame).or_bad_input()?;
+            table.insert(&record(job.sequence, files, planner, frame, source_frame(job.sequence, &plan)));
+        }
+    }
+    table.keep_what_is_in(job.folder, &|frame| !writes && made.contains_key(&frame));
+    table.write(&path).or_failed()
+}
+
+/// What source coordinates of a plan are in.
+pub fn source_frame(sequence: &Sequence, plan: &FramePlan) -> SourceFrame {
+    SourceFrame::new(plan, sequence.epoch_ns)
+}
+
+fn record(sequence: &Sequence, files: &FrameFiles, planner: &Planner, frame: u64, source: SourceFrame) -> FrameRecord {
+    let stamp_s = planner.stamp_s(frame);
+    FrameRecord {
+        frame,
+        stamp_ns: stamp_ns(sequence.epoch_ns, stamp_s),
+        pose: sequence.path.pose(stamp_s),
+        source,
+        files: files.names(frame),
+    }
+}
+
+/// Instants at `start + k / rate_hz` that enclose `seen_s`; outside of the log the platform coasts.
+fn ticks(trajectory: &Trajectory, rate_hz: f64, seen_s: [f64; 2]) -> impl Iterator<Item = f64> + use<> {
+    let start_s = trajectory.span_s().0;
+    let tick = |t_s: f64| (t_s - start_s) * rate_hz;
+    let (first, last) = ((tick(seen_s[0]) + 1e-6).floor() as i64, (tick(seen_s[1]) - 1e-6).ceil() as i64);
+    (first..=last).map(move |k| start_s + k as f64 / rate_hz)
+}
+
+/// A row of `trajectory.csv`.
+pub fn body_at(trajectory: &Trajectory, epoch_ns: i64, t_s: f64) -> TrajectoryRecord {
+    TrajectoryRecord { t_ns: stamp_ns(epoch_ns, t_s), state: trajectory.state(t_s) }
+}
+
+/// A row of `camera_trajectory.csv`.
+pub fn camera_at(path: &CameraPath, epoch_ns: i64, t_s: f64) -> CameraRecord {
+    CameraRecord {
+        t_ns: stamp_ns(epoch_ns, t_s),
+        pose: path.pose(t_s),
+        velocity_ned_m_s: path.velocity_ned(t_s),
+        rate_camera_rad_s: path.rate_camera(t_s),
+    }
+}
+
+/// Path time as a stamp, nanoseconds.
+fn stamp_ns(epoch_ns: i64, t_s: f64) -> i64 {
+    epoch_ns.saturating_add((t_s * 1e9).round() as i64)
+}

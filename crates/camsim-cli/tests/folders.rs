@@ -1,0 +1,272 @@
+//! Output folders that are true by themselves: moved, made in parts, stopped half-way.
+
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    collections::BTreeMap,
+    ffi::OsString,
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+    time::{Duration, Instant},
+};
+
+/// Set in the copy of this program that is the command line: its arguments, with this between them.
+const ARGS: &str = "CAMSIM_TEST_ARGS";
+const BETWEEN: char = '\u{1f}';
+
+/// The command line in a process of its own; of all others it is a test without a body.
+#[test]
+fn runs_as_the_program() {
+    let Ok(args) = std::env::var(ARGS) else { return };
+    let (mut out, mut err) = (std::io::stdout(), std::io::stderr());
+    let code = camsim_cli::run(std::iter::once("camsim").chain(args.split(BETWEEN)).map(OsString::from), &mut out, &mut err);
+    #[allow(clippy::disallowed_methods, reason = "the exit code is what is tested, and nothing is left to be dropped")]
+    std::process::exit(i32::from(code));
+}
+
+fn spawn(folder: &Path, args: &[&str]) -> Child {
+    program(folder, args).spawn().unwrap()
+}
+
+fn program(folder: &Path, args: &[&str]) -> Command {
+    let mut program = Command::new(std::env::current_exe().unwrap());
+    program.args(["--exact", "runs_as_the_program", "--nocapture"]).env(ARGS, args.join(&BETWEEN.to_string())).current_dir(folder);
+    program.stdout(Stdio::piped()).stderr(Stdio::piped());
+    program
+}
+
+/// Exit code and standard error.
+fn end(child: Child) -> (i32, String) {
+    let output = child.wait_with_output().unwrap();
+    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// `camsim` in a working directory.
+fn camsim(folder: &Path, args: &[&str]) -> (i32, String) {
+    end(spawn(folder, args))
+}
+
+/// A camera so small that the reference renders it in no time.
+const SMALL: [&str; 10] = [
+    "--set",
+    "camera.size_px=[32, 24]",
+    "--set",
+    "camera.focal_px=[21, 21]",
+    "--set",
+    "camera.principal_point_px=[15.5, 11.5]",
+    "--set",
+    "quality.max_error_dn=8",
+    "--backend",
+    "reference",
+];
+
+fn pattern() -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/pattern.toml").canonicalize().unwrap().to_str().unwrap().to_owned()
+}
+
+/// Renders the pattern, small, into a folder.
+fn render(base: &Path, out: &str, more: &[&str]) -> (i32, String) {
+    let pattern = pattern();
+    camsim(base, &[&["render", &pattern, "-o", out, "--outputs", "color,coords,depth,rows"][..], &SMALL, more].concat())
+}
+
+fn files_below(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = PathBuf::from(path.file_name().unwrap());
+        if path.is_dir() {
+            all.extend(files_below(&path).into_iter().map(|(below, bytes)| (name.join(below), bytes)));
+        } else {
+            all.insert(name, fs::read(&path).unwrap());
+        }
+    }
+    all
+}
+
+/// Rows of `frames.csv` by the names of its columns.
+fn frames(folder: &Path) -> Vec<BTreeMap<String, String>> {
+    let text = fs::read_to_string(folder.join("frames.csv")).unwrap();
+    let mut lines = text.lines();
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    lines.map(|line| columns.iter().zip(line.split(',')).map(|(column, cell)| ((*column).to_owned(), cell.to_owned())).collect()).collect()
+}
+
+fn numbers(folder: &Path) -> Vec<u64> {
+    frames(folder).iter().map(|row| row["frame"].parse().unwrap()).collect()
+}
+
+#[test]
+fn a_folder_that_was_copied_elsewhere_gives_the_same_bytes() {
+    let base = tempfile::tempdir().unwrap();
+    let at = |name: &str| base.path().join(name);
+    camsim_io::builtin::unpack(&at("made/demo/scene")).unwrap();
+    let more = [&SMALL[..], &["--frames", "0..3", "--outputs", "color,coords,rows", "--format", "exr,png"]].concat();
+    let (code, err) = camsim(&at("made"), &[&["render", "demo/scene/demo.toml", "-o", "demo"][..], &more].concat());
+    assert_eq!(code, 0, "{err}");
+    let made = files_below(&at("made/demo"));
+    let run = String::from_utf8(made[Path::new("run.json")].clone()).unwrap();
+    assert!(
+        run.contains("\"log\": \"scene/demo_flight.csv\"") && run.contains("\"scene/demo_dem.tif\": ") && !run.contains("../"),
+        "{run}"
+    );
+    assert!(!run.contains(base.path().to_str().unwrap()), "{run}");
+    let camera = String::from_utf8(made[Path::new("camera.toml")].clone()).unwrap();
+    assert!(camera.contains("vignette = \"scene/vignette.png\""), "{camera}");
+
+    // Elsewhere, the first one gone, from another working directory, by the folder's own scenario.
+    fs::create_dir_all(at("far/away")).unwrap();
+    fs::create_dir_all(at("work")).unwrap();
+    fs::rename(at("made/demo"), at("far/away/copy")).unwrap();
+    fs::remove_dir_all(at("made")).unwrap();
+    let frames = ["--frames", "0..3"];
+    let (code, err) = camsim(&at("work"), &[&["render", "../far/away/copy/run.json", "-o", "again"][..], &frames].concat());
+    assert_eq!(code, 0, "{err}");
+    let again = files_below(&at("work/again"));
+    for (name, bytes) in made.iter().filter(|(name, _)| !name.starts_with("scene")) {
+        // These two say where things are from here, and the vignette has come along.
+        if !["run.json", "camera.toml"].contains(&name.to_str().unwrap()) {
+            assert_eq!(Some(bytes), again.get(name), "{}", name.display());
+        }
+    }
+    assert_eq!(again[Path::new("inputs/vignette.png")], made[Path::new("scene/vignette.png")]);
+    // Into itself all is as it was, to the byte; and what is there is taken for done.
+    let (code, err) = camsim(&at("far"), &[&["render", "away/copy/run.json", "-o", "away/copy"][..], &frames].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(files_below(&at("far/away/copy")) == made);
+    let (code, err) = camsim(&at("far/away/copy"), &["render", "run.json", "-o", ".", "--frames", "0..4", "--resume"]);
+    assert_eq!(code, 0, "{err}");
+    let run: serde_json::Value = serde_json::from_slice(&fs::read(at("far/away/copy/run.json")).unwrap()).unwrap();
+    assert_eq!((run["written"].as_u64(), run["skipped"].as_u64()), (Some(1), Some(3)));
+
+    // The camera of either folder by itself.
+    for (folder, camera) in [("work", "again/camera.toml"), ("far", "away/copy/camera.toml")] {
+        let (code, err) = camsim(&at(folder), &["lens", camera, "check"]);
+        assert_eq!(code, 0, "{err}");
+        fs::write(
+            at(folder).join("F.toml"),
+            "color = \"p.png\"\nfocal_px = [30.0, 30.0]\n[motion]\nangular_rate_rad_s = [0.0, 0.0, 0.1]\n",
+        )
+        .unwrap();
+        fs::copy(at("far/away/copy/scene/acircles.png"), at(folder).join("p.png")).unwrap();
+        let (code, err) = camsim(&at(folder), &["apply", camera, "F.toml", "-o", "applied.png"]);
+        assert_eq!(code, 0, "{err}");
+    }
+}
+
+#[test]
+fn parts_make_one_table_and_scenarios_are_not_mixed() {
+    let base = tempfile::tempdir().unwrap();
+    let at = |name: &str| base.path().join(name);
+    let done = |out: &str, more: &[&str]| {
+        let (code, err) = render(base.path(), out, more);
+        assert_eq!(code, 0, "{err}");
+        err
+    };
+    done("whole", &["--frames", "2..8"]);
+    done("parts", &["--frames", "2..5"]);
+    assert_eq!(numbers(&at("parts")), [2, 3, 4]);
+    done("parts", &["--frames", "4..8"]);
+    assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    // Two at once.
+    let pattern = pattern();
+    let shard = |shard: &str| {
+        let args = ["render", &pattern, "-o", "shards", "--outputs", "color,coords,depth,rows", "--frames", "2..8", "--shard", shard];
+        spawn(base.path(), &[&args[..], &SMALL].concat())
+    };
+    for child in ["1/3", "2/3", "3/3"].map(shard) {
+        let (code, err) = end(child);
+        assert_eq!(code, 0, "{err}");
+    }
+    assert_eq!(fs::read(at("shards/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    // What is gone is not listed, and a table that is gone is made again from what is there.
+    fs::remove_file(at("parts/color/frame_000003.exr")).unwrap();
+    done("parts", &["--frames", "7", "--resume"]);
+    let rows = frames(&at("parts"));
+    assert!(rows[1]["frame"] == "3" && rows[1]["color_exr"].is_empty() && rows[1]["depth"] == "depth/frame_000003.exr", "{rows:?}");
+    fs::remove_file(at("parts/frames.csv")).unwrap();
+    done("parts", &["--frames", "2..8", "--resume"]);
+    assert_eq!(fs::read(at("parts/frames.csv")).unwrap(), fs::read(at("whole/frames.csv")).unwrap());
+    // Another channel of the same frames stands beside.
+    let channel =
+        camsim(base.path(), &[&["render", &pattern, "-o", "parts", "--outputs", "valid", "--frames", "2..4"][..], &SMALL].concat());
+    assert_eq!(channel.0, 0, "{}", channel.1);
+    let rows = frames(&at("parts"));
+    assert!(rows.len() == 6 && rows[0]["valid"] == "valid/frame_000002.png" && rows[0]["coords"] == "coords/frame_000002.exr", "{rows:?}");
+    assert!(rows[5]["valid"].is_empty(), "{rows:?}");
+
+    // Another scenario between these frames is refused before anything is touched ...
+    let before = files_below(&at("whole"));
+    let (code, err) = render(base.path(), "whole", &["--frames", "2..4", "--set", "seed=99"]);
+    assert!(
+        code == 2 && err.contains("seed was 12, now 99") && err.contains("20 files of frames, color/frame_000004.exr the first"),
+        "{err}"
+    );
+    assert!(files_below(&at("whole")) == before);
+    // ... and in place of all of them it leaves nothing behind that could be taken for its own.
+    let err = done("whole", &["--frames", "2..8", "--set", "seed=99"]);
+    assert!(err.contains("its frames are replaced"), "{err}");
+    assert_eq!(numbers(&at("whole")), [2, 3, 4, 5, 6, 7]);
+    assert!(
+        fs::read(at("whole/color/frame_000002.exr")).unwrap() == before[Path::new("color/frame_000002.exr")],
+        "the pattern has no noise"
+    );
+    // Frames that nobody knows.
+    fs::remove_file(at("whole/run.json")).unwrap();
+    let (code, err) = render(base.path(), "whole", &["--frames", "2..8", "--resume"]);
+    assert!(code == 2 && err.contains("no run.json that says what made them"), "{err}");
+    let (code, err) = render(base.path(), "whole", &["--frames", "2..4"]);
+    assert!(code == 2 && err.contains("no run.json that says what made them"), "{err}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_that_is_stopped_says_what_is_done_and_how_to_go_on() {
+    let base = tempfile::tempdir().unwrap();
+    let out = base.path().join("my out");
+    let pattern = pattern();
+    // Enough work for a signal to come in between.
+    let args =
+        [&["render", &pattern, "-o", "my out", "--outputs", "color,rows"][..], &SMALL, &["--set", "camera.size_px=[64, 48]"]].concat();
+    let child = spawn(base.path(), &args);
+    let begin = Instant::now();
+    let count = || {
+        fs::read_dir(out.join("rows"))
+            .map_or(0, |files| files.flatten().filter(|file| !file.file_name().to_string_lossy().starts_with('.')).count())
+    };
+    while count() < 2 {
+        assert!(begin.elapsed() < Duration::from_secs(120), "no frame came");
+        #[allow(clippy::disallowed_methods, reason = "files of another process tell nobody when they come")]
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let process = rustix::process::Pid::from_raw(child.id() as i32).unwrap();
+    rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
+    let (code, err) = end(child);
+    assert_eq!(code, 130, "{err}");
+    assert!(err.contains("stopping after the frames that are under way"), "{err}");
+    let told = err.lines().find(|line| line.starts_with("stopped: ")).unwrap_or_else(|| panic!("{err}"));
+    let done = count();
+    assert!(done < 60 && told.starts_with(&format!("stopped: {done} of 60 frames are in my out; to go on: camsim render ")), "{told}");
+    assert!(told.contains(" -o 'my out' ") && told.contains("--set 'camera.size_px=[64, 48]'") && told.ends_with(" --resume"), "{told}");
+    // What is written is listed, all of it and nothing else.
+    assert_eq!(numbers(&out), (0..done as u64).collect::<Vec<_>>());
+    assert!(frames(&out).iter().all(|row| out.join(&row["color_exr"]).is_file() && out.join(&row["rows"]).is_file()));
+    let run: serde_json::Value = serde_json::from_slice(&fs::read(out.join("run.json")).unwrap()).unwrap();
+    assert_eq!((run["finished"].as_bool(), run["written"].as_u64()), (Some(false), Some(done as u64)));
+    assert!(files_below(&out).keys().all(|name| !name.to_string_lossy().contains(".tmp")));
+    let (code, err) = camsim(base.path(), &[&args[..], &["--frames", "..20", "--resume"]].concat());
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(numbers(&out), (0..(done as u64).max(20)).collect::<Vec<_>>());
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn an_adapter_that_is_not_there_gets_a_list_of_those_that_are() {
+    let base = tempfile::tempdir().unwrap();
+    let there = camsim_gpu::context::adapters(camsim_gpu::AdapterChoice::Best);
+    let (code, err) = end(program(base.path(), &["info"]).env("CAMSIM_ADAPTER", "no such thing").spawn().unwrap());
+    assert!(code == 3 && err.contains("no adapter has `no such thing` in its name (CAMSIM_ADAPTER): there is "), "{err}");
+    // Of this process's own choice, which may be narrower.
+    assert!(there.iter().all(|adapter| err.contains(&adapter.to_string())) && !there.is_empty(), "{err}");
+}

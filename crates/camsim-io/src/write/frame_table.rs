@@ -1,0 +1,246 @@
+//! `frames.csv`: a row for each frame whose files are there, whoever wrote them.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use camsim_core::{plan::FramePlan, pose::CameraPose};
+
+use super::{
+    WriteError,
+    tables::{push, wxyz},
+    write_atomic,
+};
+
+/// What each row begins with, before a column of paths for each file of a frame. The first pose is the camera's at the stamp; columns that begin with `ideal_`
+/// say what the source coordinates x, y of `coords` are in: a pinhole camera's frame, and where that camera is at which instant. Both q are
+/// ned_from_camera.
+pub const FRAMES_COLUMNS: &str = "frame,stamp_ns,n,e,d,qw,qx,qy,qz,ideal_width_px,ideal_height_px,ideal_fx_px,ideal_fy_px,ideal_cx_px,\
+                                  ideal_cy_px,ideal_t_ns,ideal_n,ideal_e,ideal_d,ideal_qw,ideal_qx,ideal_qy,ideal_qz";
+
+/// One row.
+#[derive(Clone, Debug)]
+pub struct FrameRecord {
+    /// Frame number.
+    pub frame: u64,
+    /// Stamp, nanoseconds.
+    pub stamp_ns: i64,
+    /// Of the camera at the stamp.
+    pub pose: CameraPose,
+    /// What source coordinates are in.
+    pub source: SourceFrame,
+    /// Column name and path below the output folder.
+    pub files: Vec<(String, String)>,
+}
+
+/// The pinhole camera that source coordinates of a frame are in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SourceFrame {
+    /// Width, height.
+    pub size_px: [u32; 2],
+    /// fx, fy.
+    pub focal_px: [f64; 2],
+    /// Principal point.
+    pub principal_px: [f64; 2],
+    /// Instant, nanoseconds on the clock of stamps.
+    pub t_ns: i64,
+    /// Its pose then.
+    pub pose: CameraPose,
+}
+
+impl SourceFrame {
+    /// Of a plan; `epoch_ns` is the stamp at path time 0.
+    #[must_use]
+    pub fn new(plan: &FramePlan, epoch_ns: i64) -> Self {
+        Self {
+            size_px: plan.ideal.size_px,
+            focal_px: plan.ideal.focal_px.to_array(),
+            principal_px: plan.ideal.principal_px.to_array(),
+            t_ns: epoch_ns.saturating_add((plan.key_s * 1e9).round() as i64),
+            pose: plan.key_pose,
+        }
+    }
+}
+
+/// The table: rows by frame number.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FrameTable {
+    /// Names of the columns of files.
+    columns: Vec<String>,
+    /// What stands before the files, and the path of each, empty where there is none.
+    rows: BTreeMap<u64, (String, Vec<String>)>,
+}
+
+impl FrameTable {
+    /// What is in `path`: nothing, if there is no such table, or one with other columns.
+    #[must_use]
+    pub fn read(path: &Path) -> Self {
+        std::fs::read_to_string(path).ok().and_then(|text| Self::parse(&text)).unwrap_or_default()
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let mut lines = text.lines();
+        let files = lines.next()?.strip_prefix(FRAMES_COLUMNS)?;
+        let columns: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
+        let own = FRAMES_COLUMNS.split(',').count();
+        let row = |line: &str| {
+            let (at, _) = line.match_indices(',').chain([(line.len(), "")]).nth(own - 1)?;
+            let (values, files) = line.split_at(at);
+            let mut files: Vec<String> = files.split(',').skip(1).map(str::to_owned).collect();
+            files.resize(columns.len(), String::new());
+            Some((values.split(',').next()?.parse().ok()?, (values.to_owned(), files)))
+        };
+        // A line that cannot be read is of a frame that will be found without a row.
+        let rows = lines.filter_map(row).collect();
+        Some(Self { columns, rows })
+    }
+
+    /// Takes in a row, in place of the one that its frame had. Files of other columns stay with it.
+    pub fn insert(&mut self, record: &FrameRecord) {
+        for (column, _) in &record.files {
+            if !self.columns.contains(column) {
+                self.columns.push(column.clone());
+            }
+        }
+        let mut values = format!("{},{}", record.frame, record.stamp_ns);
+        push(&mut values, &record.pose.position_ned_m.to_array());
+        push(&mut values, &wxyz(record.pose.ned_from_camera));
+        let source = &record.source;
+        push(&mut values, &source.size_px.map(f64::from));
+        push(&mut values, &source.focal_px);
+        push(&mut values, &source.principal_px);
+        values += &format!(",{}", source.t_ns);
+        push(&mut values, &source.pose.position_ned_m.to_array());
+        push(&mut values, &wxyz(source.pose.ned_from_camera));
+        let row = self.rows.entry(record.frame).or_default();
+        row.0 = values;
+        row.1.resize(self.columns.len(), String::new());
+        for (column, file) in &record.files {
+            if let Some(at) = self.columns.iter().position(|known| known == column) {
+                row.1[at].clone_from(file);
+            }
+        }
+    }
+
+    /// Keeps what is there: files below `folder`, and frames with any of them, or that `also` names.
+    pub fn keep_what_is_in(&mut self, folder: &Path, also: &dyn Fn(u64) -> bool) {
+        let columns = self.columns.len();
+        self.rows.retain(|frame, (_, files)| {
+            files.resize(columns, String::new());
+            files.iter_mut().filter(|file| !folder.join(file.as_str()).is_file()).for_each(String::clear);
+            files.iter().any(|file| !file.is_empty()) || also(*frame)
+        });
+        let is_used = |column: usize| self.rows.values().any(|(_, files)| !files[column].is_empty());
+        let used: Vec<bool> = (0..columns).map(is_used).collect();
+        let kept = |list: &[String]| list.iter().zip(&used).filter(|(_, used)| **used).map(|(item, _)| item.clone()).collect();
+        self.columns = kept(&self.columns);
+        self.rows.values_mut().for_each(|(_, files)| *files = kept(files));
+    }
+
+    /// Whether frame `index` has a row.
+    #[must_use]
+    pub fn contains(&self, index: u64) -> bool {
+        self.rows.contains_key(&index)
+    }
+
+    /// Whether frame `index` has a row with all of these files.
+    #[must_use]
+    pub fn has_files(&self, index: u64, files: &[(String, String)]) -> bool {
+        let Some((_, there)) = self.rows.get(&index) else { return false };
+        let has = |column: &String, file: &String| self.columns.iter().zip(there).any(|(known, at)| known == column && at == file);
+        files.iter().all(|(column, file)| has(column, file))
+    }
+
+    /// As CSV.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let mut text = FRAMES_COLUMNS.to_owned();
+        let line = |text: &mut String, files: &[String]| {
+            for i in 0..self.columns.len() {
+                text.push(',');
+                text.push_str(files.get(i).map_or("", String::as_str));
+            }
+            text.push('\n');
+        };
+        line(&mut text, &self.columns);
+        for (values, files) in self.rows.values() {
+            text.push_str(values);
+            line(&mut text, files);
+        }
+        text
+    }
+
+    /// Writes it whole.
+    ///
+    /// # Errors
+    /// As [`write_atomic`].
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        write_atomic(path, self.to_csv().as_bytes())
+    }
+}
+
+/// Where the table of a folder is.
+#[must_use]
+pub fn frames_path(folder: &Path) -> PathBuf {
+    folder.join("frames.csv")
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
+
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+
+    fn record(frame: u64, columns: &[&str]) -> FrameRecord {
+        let pose = CameraPose { position_ned_m: DVec3::new(1.0, -2.5, 3.0), ned_from_camera: DQuat::IDENTITY };
+        let source = SourceFrame { size_px: [700, 500], focal_px: [420.0, 421.5], principal_px: [349.5, 249.25], t_ns: -7, pose };
+        let files = columns.iter().map(|column| ((*column).to_owned(), format!("{column}/{frame}"))).collect();
+        FrameRecord { frame, stamp_ns: 9, pose, source, files }
+    }
+
+    #[test]
+    fn rows_have_what_coordinates_need_and_read_back() {
+        let mut table = FrameTable::default();
+        table.insert(&record(4, &["color_exr"]));
+        let text = table.to_csv();
+        assert_eq!(
+            text,
+            format!("{FRAMES_COLUMNS},color_exr\n4,9,1,-2.5,3,1,0,0,0,700,500,420,421.5,349.5,249.25,-7,1,-2.5,3,1,0,0,0,color_exr/4\n")
+        );
+        assert_eq!(FrameTable::parse(&text).unwrap(), table);
+        assert_eq!(FrameTable::default().to_csv(), format!("{FRAMES_COLUMNS}\n"));
+        // Of another version.
+        assert_eq!(FrameTable::parse("frame,stamp_ns,n,e,d,qw,qx,qy,qz,color_exr\n4,9,1,1,1,1,0,0,0,a\n"), None);
+    }
+
+    #[test]
+    fn parts_make_the_table_of_the_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = frames_path(folder.path());
+        let whole = |frames: &[u64]| {
+            let mut table = FrameTable::default();
+            frames.iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
+            table
+        };
+        whole(&[0, 2, 4]).write(&path).unwrap();
+        let mut table = FrameTable::read(&path);
+        [1, 3, 4].iter().for_each(|&frame| table.insert(&record(frame, &["color_exr", "rows"])));
+        assert_eq!(table.to_csv(), whole(&[0, 1, 2, 3, 4]).to_csv());
+        // Another channel of the same frames.
+        table.insert(&record(3, &["depth"]));
+        let text = table.to_csv();
+        let last: Vec<&str> = text.lines().map(|line| line.rsplit(',').next().unwrap()).collect();
+        assert_eq!(last, ["depth", "", "", "", "depth/3", ""]);
+        // Only what is there counts.
+        std::fs::create_dir(folder.path().join("depth")).unwrap();
+        std::fs::write(folder.path().join("depth/3"), "").unwrap();
+        table.keep_what_is_in(folder.path(), &|frame| frame == 1);
+        let lines: Vec<String> = table.to_csv().lines().map(str::to_owned).collect();
+        assert!(lines.len() == 3 && lines[0].ends_with("ideal_qz,depth"), "{lines:?}");
+        assert!(lines[1].starts_with("1,9,") && lines[1].ends_with("0,") && lines[2].starts_with("3,9,") && lines[2].ends_with(",depth/3"));
+        assert!(table.contains(3) && !table.contains(0));
+    }
+}
