@@ -35,7 +35,13 @@ pub const PARAMS: &[Param] = &[
     param("flight.log", "", ANY, 1.0, "the flight log: time, position, attitude (the paper's section 3)"),
     param("flight.format", "", ANY, 1.0, "columns of the log; auto refuses what could be two of them"),
     param("flight.time_unit", "", ANY, 1.0, "unit of times whose column names none; auto refuses what the values leave in doubt"),
-    param("flight.angle_unit", "", ANY, 1.0, "unit of roll, pitch and yaw whose columns name none; auto refuses what the values leave in doubt"),
+    param(
+        "flight.angle_unit",
+        "",
+        ANY,
+        1.0,
+        "unit of roll, pitch and yaw whose columns name none; auto refuses what the values leave in doubt",
+    ),
     param("flight.angles", "", ANY, 1.0, "whether angles wrap or count turns"),
     param("flight.attitude", "", ANY, 1.0, "the log's own attitude, or heading, bank and climb from the flown path"),
     param(
