@@ -61,7 +61,8 @@ pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureE
         let raster = Raster::read(path)?;
         (raster.to_texture(path, encoding)?, raster.geo.orientation)
     } else {
-        read_stored(path, encoding)?
+        let Stored { texture, orientation, .. } = read_stored(path, encoding)?;
+        (texture, orientation)
     };
     Ok(match orientation {
         Some(orientation) => oriented(texture, orientation),
@@ -69,12 +70,29 @@ pub fn read_texture(path: &Path, encoding: Encoding) -> Result<Texture, PictureE
     })
 }
 
-/// The rows of a picture that is no TIFF as they are stored, with the number of its orientation if it is another than theirs.
-pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<(Texture, Option<u64>), PictureError> {
+/// A picture that is no TIFF, its rows as they are stored.
+pub(crate) struct Stored {
+    pub(crate) texture: Texture,
+    /// The number of its orientation, if it is another than theirs.
+    pub(crate) orientation: Option<u64>,
+    /// Its largest value but alpha, where it has 16 bits.
+    pub(crate) largest_of_16_bits: Option<u16>,
+}
+
+/// Reads it.
+pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<Stored, PictureError> {
     let (picture, orientation) = decode(path)?;
+    let largest_of_16_bits = match &picture {
+        DynamicImage::ImageLuma16(picture) => picture.iter().max().copied(),
+        DynamicImage::ImageLumaA16(picture) => picture.pixels().map(|pixel| pixel.0[0]).max(),
+        DynamicImage::ImageRgb16(picture) => picture.iter().max().copied(),
+        DynamicImage::ImageRgba16(picture) => picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).max(),
+        _ => None,
+    };
     let picture = picture.into_rgba8();
     let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
-    Ok((Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding }, number))
+    let texture = Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
+    Ok(Stored { texture, orientation: number, largest_of_16_bits })
 }
 
 /// A picture turned as its orientation (1 to 8, EXIF) says.

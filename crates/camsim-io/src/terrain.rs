@@ -4,6 +4,7 @@ mod bands;
 mod beside;
 mod crs;
 mod dem;
+mod docs;
 mod geo_tags;
 mod georeference;
 mod height_files;
@@ -31,6 +32,7 @@ use glam::DVec3;
 
 use crate::pictures::PictureError;
 pub(crate) use beside::files as files_beside_raster;
+pub use docs::documentation;
 
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
 use ortho::Ortho;

@@ -241,3 +241,72 @@ fn a_picture_that_holds_the_ground_stays_as_it_is() {
     let loaded = read(&TerrainSpec { beyond: Beyond::Void, ..with_ortho("ortho/o_mask.tif") }).unwrap();
     assert_heights(&loaded, |column, _| column < 48);
 }
+
+/// What is read is documented, out of the tables that the readers have.
+#[test]
+fn the_documentation_is_what_the_tables_say() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/inputs/TERRAIN.md");
+    let page = camsim_io::terrain::documentation();
+    if std::env::var_os("CAMSIM_BLESS").is_some() {
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, &page).unwrap();
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap_or_default(), page, "CAMSIM_BLESS=1 writes docs/inputs/TERRAIN.md");
+}
+
+/// Heights and colours of real terrains at three places each, as GDAL reads them.
+#[test]
+fn real_terrains_are_what_gdal_reads() {
+    let Some(data) = std::env::var_os("CAMSIM_DATA").map(PathBuf::from) else {
+        eprintln!("CAMSIM_DATA is not set: real terrain is not read");
+        return;
+    };
+    type Places<T> = [([u32; 2], T); 3];
+    let cases: [(&str, Places<f64>, Option<(&str, Places<[u8; 3]>)>); 7] = [
+        (
+            "duebendorf/duebendorf.tif",
+            [([145, 88], 468.063_659_7), ([218, 176], 486.052_612_3), ([429, 348], 464.626_892_1)],
+            Some((
+                "duebendorf/duebendorf_color.tif",
+                [([145, 88], [125, 117, 88]), ([218, 176], [139, 130, 129]), ([429, 348], [144, 114, 116])],
+            )),
+        ),
+        (
+            "hinwil/hinwil.tif",
+            [([120, 59], 535.931_030_3), ([180, 118], 536.607_055_7), ([353, 231], 540.106_567_4)],
+            Some(("hinwil/hinwil_color.tif", [([120, 59], [163, 163, 129]), ([180, 118], [154, 155, 138]), ([353, 231], [58, 89, 74])])),
+        ),
+        ("hinwil/hinwil_large_dem.tif", [([141, 83], 536.051_635_7), ([212, 166], 536.897_583), ([417, 328], 540.611_084)], None),
+        ("bern/swissALTI3D_bern_2m.tif", [([333, 250], 558.060_119_6), ([500, 500], 620.913_024_9), ([993, 995], 604.958_313)], None),
+        (
+            "brighton_beach/brighton_beach_dsm_10cm.tif",
+            [([355, 244], f64::NAN), ([532, 489], 162.520_004_3), ([1058, 973], f64::NAN)],
+            Some(("brighton_beach/brighton_beach_rgb_10cm.tif", [([532, 489], [126, 146, 68]); 3])),
+        ),
+        ("jacksboro/jacksboro_fault_dem.tif", [([134, 86], 521.0), ([201, 172], 583.0), ([396, 339], 273.0)], None),
+        (
+            "sertig/sertig_valley.tif",
+            [([213, 229], 1754.481_567_4), ([320, 458], 1918.926_147_5), ([634, 912], 2560.677_002)],
+            Some((
+                "sertig/sertig_valley_color.tif",
+                [([213, 229], [60, 99, 48]), ([320, 458], [83, 102, 68]), ([634, 912], [134, 128, 96])],
+            )),
+        ),
+    ];
+    for (dem, heights, colors) in cases {
+        let ortho = colors.map(|(ortho, _)| data.join("terrain").join(ortho));
+        let spec = TerrainSpec { dem: data.join("terrain").join(dem), ortho, ..TerrainSpec::default() };
+        let ned = |lat: f64, lon: f64, height: f64| DVec3::new((lat - 0.8) * 1e6, lon * 1e6, -height);
+        let loaded = read_terrain(&spec, &ned, None).unwrap();
+        for (at, expected) in heights {
+            match height_m(&loaded, at) {
+                None => assert!(expected.is_nan(), "{dem} {at:?}"),
+                Some(found) => assert!((found - expected).abs() < 1e-3, "{dem} {at:?}: {found} {expected}"),
+            }
+        }
+        for (at, expected) in colors.iter().flat_map(|(_, places)| places) {
+            assert_eq!(color(&loaded, *at), *expected, "{dem} {at:?}");
+        }
+        eprintln!("{dem}: {:?}", loaded.notes);
+    }
+}

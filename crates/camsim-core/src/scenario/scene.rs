@@ -73,7 +73,7 @@ pub struct TerrainSpec {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ortho_white: Option<f64>,
     /// What is seen where the ortho-image has nothing.
-    #[serde(default, skip_serializing_if = "is_default")]
+    #[serde(default)]
     pub beyond: Beyond,
 }
 
@@ -112,10 +112,6 @@ pub enum Beyond {
     Edge,
     /// No ground.
     Void,
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
 }
 
 /// `scene.pattern`: level at the origin's height, image top to the north.

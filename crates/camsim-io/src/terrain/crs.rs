@@ -93,10 +93,6 @@ impl Crs {
         Some(Self { epsg, name: name.into(), accuracy_m: accuracy.parse().ok(), kind: projected(definition)? })
     }
 
-    pub fn is_geographic(&self) -> bool {
-        matches!(self.kind, Kind::Geographic)
-    }
-
     /// Metres in a unit of its coordinates; `None` for degrees.
     pub fn metres_per_unit(&self) -> Option<f64> {
         match &self.kind {

@@ -8,7 +8,7 @@ use camsim_core::scenario::{HeightReference, TerrainSpec};
 
 use super::{
     TerrainFileError, beside,
-    crs::Crs,
+    crs::{Crs, compound},
     geo_tags::GeoTags,
     georeference::{self, Affine, world_file},
     height_files,
@@ -76,7 +76,8 @@ impl Dem {
             return Err(TerrainFileError::NotHeights { path: path.into(), bands: raster.bands() });
         }
         notes.extend(geo.notes.iter().cloned());
-        let vertical = stated.vertical.map(|code| Vertical::of(code, &geo.keys.vertical_citation));
+        let of_key = spec.epsg.and_then(compound).map(|[_, vertical]| vertical);
+        let vertical = stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
         notes.extend(vertical.as_ref().and_then(|vertical| vertical.note(spec.height, converts)));
         if vertical.is_none() && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955) && spec.height == HeightReference::Msl {
             let three = Vertical { code: crs.epsg, datum: Some(Datum::Ellipsoid), name: crs.name.clone(), metres_per_unit: Some(1.0) };

@@ -99,7 +99,7 @@ impl Metadata {
 
     fn band(&mut self, index: usize) -> Result<&mut BandMeaning, String> {
         if index >= 1 << 16 {
-            return Err(format!("an item is of sample {index}"));
+            return Err(format!("an item is of sample `{index}`"));
         }
         if self.bands.len() <= index {
             self.bands.resize(index + 1, BandMeaning::default());

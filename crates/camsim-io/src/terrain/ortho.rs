@@ -15,8 +15,9 @@ use super::{
     georeference::Affine,
     raster::{Raster, is_tiff},
     systems::Stated,
+    tiff_file::gdal_translate,
 };
-use crate::pictures::{PictureError, read_stored};
+use crate::pictures::{PictureError, Stored, read_stored};
 
 /// A picture of the ground.
 pub(super) struct Ortho {
@@ -25,6 +26,8 @@ pub(super) struct Ortho {
     pub place: Option<OrthoPlace>,
     /// Whether there is something at its pixels, where it does not cover all of them.
     content: Option<Vec<bool>>,
+    /// Whether it reaches as far as the ground does.
+    holds_ground: bool,
     /// What there is to say about it.
     pub notes: Vec<String>,
 }
@@ -80,7 +83,7 @@ impl Ortho {
             notes.extend(geo.notes);
             let content = content_of(&texture);
             finish(&mut texture, None, spec.beyond);
-            return Ok(Self { texture, place: None, content, notes: with_name(path, notes) });
+            return Ok(Self { texture, place: None, content, holds_ground: true, notes: with_name(path, notes) });
         };
         notes.extend(geo.notes.iter().cloned());
         if let Some(orientation) = geo.orientation {
@@ -98,11 +101,12 @@ impl Ortho {
         let middle_x = model_from_pixel.apply(size.map(|n| 0.5 * n))[0];
         let mut place = OrthoPlace { pixel_from_model, is_of_dem: crs.epsg == dem.crs.epsg, crs, size, middle_x, margin_px: 0.0 };
         // What holds the border of the ground holds the ground.
-        if spec.beyond == Beyond::Grey && dem.border().any(|at| !place.is_inside(place.pixel(dem, at))) {
+        let holds_ground = dem.border().all(|at| place.is_inside(place.pixel(dem, at)));
+        if spec.beyond == Beyond::Grey && !holds_ground {
             texture = texture.within(MARGIN_PX, [GREY, GREY, GREY, 255]);
             place.margin_px = f64::from(MARGIN_PX);
         }
-        Ok(Self { texture, place: Some(place), content, notes: with_name(path, notes) })
+        Ok(Self { texture, place: Some(place), content, holds_ground, notes: with_name(path, notes) })
     }
 
     /// The colour of ground beyond it, if that is one.
@@ -119,6 +123,9 @@ impl Ortho {
 
     /// Whether it shows something at a height.
     pub fn shows(&self, dem: &Dem, at: [u32; 2]) -> bool {
+        if self.holds_ground && self.content.is_none() {
+            return true;
+        }
         let pixel = match &self.place {
             Some(place) => place.pixel(dem, at),
             None => [0, 1].map(|k: usize| (f64::from(at[k]) + 0.5) / f64::from(dem.size[k]) * f64::from(self.texture.size_px[k])),
@@ -155,10 +162,17 @@ fn picture(path: &Path, spec: &TerrainSpec) -> Result<(Texture, GeoTags, Vec<Str
     if spec.ortho_white.is_some() {
         return Err(failed(PictureError::decode(path, "scene.terrain.ortho_white is for TIFF files: leave it out")));
     }
-    let (texture, orientation) = read_stored(path, Encoding::Srgb).map_err(failed)?;
+    let Stored { texture, orientation, largest_of_16_bits } = read_stored(path, Encoding::Srgb).map_err(failed)?;
     let mut geo = GeoTags { orientation, ..GeoTags::default() };
     beside::read_tags(path, &mut geo)?;
-    Ok((texture, geo, Vec::new()))
+    let dark = largest_of_16_bits.filter(|largest| (1..1 << 14).contains(largest)).map(|largest| {
+        let white = (1_u32 << (u16::BITS - largest.leading_zeros())) - 1;
+        let command = gdal_translate(&format!("-ot Byte -scale 0 {white} 0 255"), path);
+        format!(
+            "its values of 16 bits end at {largest} of 65535: the picture is nearly black. If white is {white}, convert it with `{command}`"
+        )
+    });
+    Ok((texture, geo, dark.into_iter().collect()))
 }
 
 /// Neutral, and as bright as a card of 18 % looks: sRGB.

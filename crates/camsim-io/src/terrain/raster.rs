@@ -142,8 +142,8 @@ impl Raster {
         let mut notes = bands.notes.clone();
         let most = f64::from((1_u32 << image.bits) - 1);
         notes.extend(self.say_scale(&bands, white, most));
-        let (to_byte, white) = (255.0 / white.unwrap_or(most), white.unwrap_or(most));
-        let byte = |pixel: usize, band: usize| (f64::from(image.unsigned(pixel, band)) * to_byte).round().min(255.0) as u8;
+        let white = white.unwrap_or(most);
+        let byte = |pixel: usize, band: usize| (f64::from(image.unsigned(pixel, band)) * 255.0 / white).round().min(255.0) as u8;
         let mark = self.geo.nodata.filter(|mark| mark.fract() == 0.0 && (0.0..=most).contains(mark)).map(|mark| mark as u32);
         let color = |pixel: usize| -> [u8; 4] {
             let mut rgb = match (&self.palette, bands.is_palette) {
@@ -179,6 +179,9 @@ impl Raster {
     /// Where the largest stored number is far from what is taken for white.
     fn say_scale(&self, bands: &ColorBands, white: Option<f64>, most: f64) -> Option<String> {
         let image = &self.image;
+        if bands.is_palette && white.is_some() {
+            return Some("its colours are those of a palette: scene.terrain.ortho_white is not used".to_owned());
+        }
         if bands.is_palette || (image.bits <= 8 && white.is_none()) {
             return None;
         }

@@ -90,7 +90,8 @@ fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: b
     };
     let edit =
         drag(ui, key, "", as_f64(value), param, whole, out).map(|(number, ongoing)| Edit { value: Some(to_value(number, whole)), ongoing });
-    let may_be_left_out = matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg") || key.starts_with("scene.light.");
+    let may_be_left_out =
+        matches!(key, "scene.fog_visibility_m" | "scene.terrain.epsg" | "scene.terrain.ortho_white") || key.starts_with("scene.light.");
     if may_be_left_out && remove(ui, key) {
         return Some(Edit { value: None, ongoing: false });
     }
@@ -101,6 +102,7 @@ fn first_value(param: &Param) -> f64 {
     let light = LightSpec::default();
     match param.key {
         "scene.fog_visibility_m" => 10_000.0,
+        "scene.terrain.ortho_white" => 2047.0,
         "scene.light.sun_azimuth_deg" => light.sun_azimuth_deg,
         "scene.light.sun_elevation_deg" => light.sun_elevation_deg,
         "scene.light.sun" => light.sun,

@@ -1,0 +1,139 @@
+//! ESRI grids, SRTM tiles, and files beside rasters.
+
+use std::{fs, path::Path};
+
+use camsim_core::scenario::{HeightReference, TerrainSpec};
+
+use super::{by_gdal, fails, height_m, raster::Tiff, read, spec};
+
+const HEADER: &str = "ncols 4\nnrows 3\nxllcorner 500000\nyllcorner 5200000\ncellsize 10\nNODATA_value -99\n";
+const VALUES: &str = "1 2 3 4\n5 6.5 7 8\n9 10 11 -99\n";
+const UTM_PRJ: &str = r#"PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],UNIT["Meter",1.0]]"#;
+
+fn grid(folder: &Path, text: &str) -> TerrainSpec {
+    let path = folder.join("dem.asc");
+    fs::write(&path, text).unwrap();
+    TerrainSpec { epsg: Some(32632), ..spec(&path) }
+}
+
+#[test]
+fn ascii_grids_have_their_heights_and_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let corner = read(&grid(folder.path(), &format!("{HEADER}{VALUES}"))).unwrap();
+    assert_eq!([[0, 0], [1, 1], [0, 2], [3, 2]].map(|at| height_m(&corner, at)), [Some(1.0), Some(6.5), Some(9.0), None]);
+    // Rows go south: (20, 15) m from the corner in the middle.
+    let expected = [46.953_664_2, 9.000_262_8];
+    let middle = |loaded: &camsim_io::terrain::LoadedTerrain| loaded.summary.centre_rad.map(f64::to_degrees);
+    let found = middle(&corner);
+    assert!((0..2).all(|k| (found[k] - expected[k]).abs() < 2e-6), "{found:?}");
+    // The same by the middle of the first pixel, in capitals, with windows' line ends, values over several lines, and a mark of its own.
+    let centre = HEADER.to_uppercase().replace("XLLCORNER 500000", "XLLCENTER 500005").replace("YLLCORNER 5200000", "YLLCENTER 5200005");
+    let text = format!("\u{feff}{centre}{}", VALUES.replace("4\n", "4 ")).replace('\n', "\r\n");
+    let loaded = read(&grid(folder.path(), &text)).unwrap();
+    assert!((0..2).all(|k| (middle(&loaded)[k] - found[k]).abs() < 1e-9));
+    assert_eq!(height_m(&loaded, [0, 1]), Some(5.0));
+    // By the file beside it.
+    fs::write(folder.path().join("dem.prj"), UTM_PRJ).unwrap();
+    let loaded = read(&TerrainSpec { epsg: None, ..grid(folder.path(), &format!("{HEADER}{VALUES}")) }).unwrap();
+    assert_eq!((loaded.summary.epsg, middle(&loaded)), (32632, found));
+    // Cells that are not square; a height of nothing.
+    let text = HEADER.replace("cellsize 10", "dx 10\ndy 20") + "1 2 3 4\n5 6.5 7 8\n9 10 11 nan\n";
+    let loaded = read(&grid(folder.path(), &text)).unwrap();
+    assert!((loaded.terrain.bounds.max.x - loaded.terrain.bounds.min.x) / 1e5 > 5e-6 && height_m(&loaded, [3, 2]).is_none());
+}
+
+#[test]
+fn ascii_grids_that_are_none_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, says) in [
+        (HEADER.to_owned(), "holds 0 heights, and 4 x 3 are 12"),
+        (format!("{HEADER}{VALUES}1"), "holds 13 heights"),
+        (format!("{HEADER}1 2 3 4\n5 6,5 7 8\n9 10 11 12"), "line 8: `6,5` is no number (decimals need a point)"),
+        (format!("{}{VALUES}", HEADER.replace("cellsize 10\n", "")), "no `cellsize`"),
+        (format!("{}{VALUES}", HEADER.replace("cellsize 10", "cellsize -10")), "line 5: cellsize is -10"),
+        (format!("{}{VALUES}", HEADER.replace("cellsize 10", "cellsize 10 m")), "line 5: `cellsize 10 m` is no key with its value"),
+        (format!("{}{VALUES}", HEADER.replace("xllcorner 500000\n", "")), "no `xllcorner` and `yllcorner`"),
+        (format!("{}{VALUES}", HEADER.replace("nrows 3", "nrows 0")), "line 2: nrows is `0`"),
+        (format!("{}{VALUES}", HEADER.replace("nrows 3", "nrows 4000000000")), "do not fit into"),
+        (format!("{}{VALUES}", HEADER.replace("cellsize", "zunits feet\ncellsize")), "`zunits` is no key"),
+    ] {
+        let error = fails(&grid(folder.path(), &text));
+        assert!(error.contains("dem.asc") && error.contains(says), "{error}");
+    }
+    let error = fails(&TerrainSpec { epsg: None, ..grid(folder.path(), &format!("{HEADER}{VALUES}")) });
+    assert!(error.contains("scene.terrain.epsg"), "{error}");
+    fs::write(folder.path().join("dem.prj"), UTM_PRJ.replace("WGS_1984_UTM_Zone_32N", "My_Site")).unwrap();
+    let error = fails(&TerrainSpec { epsg: None, ..grid(folder.path(), &format!("{HEADER}{VALUES}")) });
+    assert!(error.contains("My_Site in dem.prj") && error.contains("scene.terrain.epsg"), "{error}");
+}
+
+#[test]
+fn srtm_tiles_lie_where_their_name_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights = |name: &str| {
+        let path = folder.path().join(name);
+        let height = |row: i16, column: i16| if (row, column) == (3, 4) { i16::MIN } else { row - column };
+        let bytes: Vec<u8> = (0..1201).flat_map(|row| (0..1201).flat_map(move |column| height(row, column).to_be_bytes())).collect();
+        fs::write(&path, bytes).unwrap();
+        TerrainSpec { height: HeightReference::Msl, ..spec(&path) }
+    };
+    let loaded = read(&heights("N47E008.hgt")).unwrap();
+    assert_eq!([[0, 2], [5, 0], [4, 3]].map(|at| height_m(&loaded, at)), [Some(2.0), Some(-5.0), None]);
+    let degrees = |loaded: &camsim_io::terrain::LoadedTerrain| {
+        [loaded.summary.south_west_rad, loaded.summary.north_east_rad].map(|place| place.map(f64::to_degrees))
+    };
+    let near = |found: [[f64; 2]; 2], expected: [[f64; 2]; 2]| (0..4).all(|k| (found[k / 2][k % 2] - expected[k / 2][k % 2]).abs() < 1e-9);
+    assert!(near(degrees(&loaded), [[47.0, 8.0], [48.0, 9.0]]) && loaded.notes.is_empty(), "{:?} {:?}", degrees(&loaded), loaded.notes);
+    let south = read(&TerrainSpec { height: HeightReference::Ellipsoid, ..heights("s01w072.HGT") }).unwrap();
+    assert!(near(degrees(&south), [[-1.0, -72.0], [0.0, -71.0]]));
+    assert!(south.notes[0].contains("EGM96") && south.notes[0].contains("scene.terrain.height = \"msl\""), "{:?}", south.notes);
+    for name in ["tile.hgt", "N47X008.hgt", "N97E008.hgt", "N4é7E08.hgt"] {
+        let error = fails(&heights(name));
+        assert!(error.contains("south-western corner"), "{error}");
+    }
+    fs::write(folder.path().join("N47E008.hgt"), [0; 100]).unwrap();
+    let error = fails(&spec(&folder.path().join("N47E008.hgt")));
+    assert!(error.contains("this file has 100 bytes"), "{error}");
+    fs::write(folder.path().join("dem.zip"), b"PK\x03\x04").unwrap();
+    assert!(fails(&spec(&folder.path().join("dem.zip"))).contains("unpack it"));
+}
+
+#[test]
+fn what_lies_beside_adds_to_a_raster_or_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    let aux = folder.path().join("dem.tif.aux.xml");
+    let band = |inside: &str| format!("<PAMDataset><PAMRasterBand band=\"1\">{inside}</PAMRasterBand></PAMDataset>");
+    Tiff::heights([4, 3], |column, _| 100.0 + column as f32).write(&path);
+    fs::write(&aux, band("<Scale>2</Scale><Offset>10</Offset><UnitType>ft</UnitType><NoDataValue>102</NoDataValue>")).unwrap();
+    let loaded = read(&spec(&path)).unwrap();
+    assert!((height_m(&loaded, [1, 0]).unwrap() - 212.0 * 0.3048).abs() < 1e-3 && height_m(&loaded, [2, 0]).is_none());
+    // Of another band; nothing but statistics.
+    for text in
+        [band("<Scale>2</Scale>").replace("band=\"1\"", "band=\"2\""), band("<Metadata><MDI key=\"STATISTICS_MEAN\">5</MDI></Metadata>")]
+    {
+        fs::write(&aux, text).unwrap();
+        assert_eq!(height_m(&read(&spec(&path)).unwrap(), [1, 0]), Some(101.0));
+    }
+    for (text, says) in [
+        (band("<Scale>two</Scale>"), "Scale is `two`"),
+        (band("<NoDataValue>none</NoDataValue>"), "NoDataValue is `none`"),
+        ("<PAMDataset>".to_owned(), "no GDAL metadata"),
+        ("<PAMDataset><GeoTransform>1, 2, 3</GeoTransform></PAMDataset>".to_owned(), "no list of six numbers"),
+        ("<PAMDataset><GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform></PAMDataset>".to_owned(), "the raster itself says another"),
+    ] {
+        fs::write(&aux, text).unwrap();
+        let error = fails(&spec(&path));
+        assert!(error.contains("dem.tif.aux.xml") && error.contains(says), "{error}");
+    }
+    fs::remove_file(&aux).unwrap();
+    // A world file has no say where tags have one, and it is said; one that agrees is nothing to speak of.
+    fs::write(folder.path().join("dem.tfw"), "10 0 0 -10 500005 5199995").unwrap();
+    assert!(read(&spec(&path)).unwrap().notes.is_empty());
+    fs::write(folder.path().join("dem.tfw"), "10 0 0 -10 500105 5199995").unwrap();
+    assert!(read(&spec(&path)).unwrap().notes[0].contains("a world file beside it says another place"));
+    // A mask of another size.
+    fs::copy(by_gdal("beside_mask.tif.msk"), folder.path().join("dem.tif.msk")).unwrap();
+    let error = fails(&spec(&path));
+    assert!(error.contains("dem.tif.msk") && error.contains("its mask has [40, 30] pixels"), "{error}");
+}
