@@ -21,7 +21,9 @@ fn ground() -> Scene {
     let side = 2 * HALF_M as u32;
     let picture = Texture {
         size_px: [side; 2],
-        rgba8: (0..side * side).flat_map(|i| [250, if (i % side / 3 + i / side / 3) % 2 == 0 { 20 } else { 60 }, 10, 255]).collect(),
+        rgba8: (0..side * side)
+            .flat_map(|i| [250, if (i % side / 3 + i / side / 3).is_multiple_of(2) { 20 } else { 60 }, 10, 255])
+            .collect(),
         encoding: Encoding::Srgb,
     };
     let grey = [GREY, GREY, GREY, 255];

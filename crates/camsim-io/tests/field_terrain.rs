@@ -262,7 +262,8 @@ fn real_terrains_are_what_gdal_reads() {
         return;
     };
     type Places<T> = [([u32; 2], T); 3];
-    let cases: [(&str, Places<f64>, Option<(&str, Places<[u8; 3]>)>); 7] = [
+    type Case<'a> = (&'a str, Places<f64>, Option<(&'a str, Places<[u8; 3]>)>);
+    let cases: [Case<'_>; 7] = [
         (
             "duebendorf/duebendorf.tif",
             [([145, 88], 468.063_659_7), ([218, 176], 486.052_612_3), ([429, 348], 464.626_892_1)],
@@ -286,7 +287,7 @@ fn real_terrains_are_what_gdal_reads() {
         ("jacksboro/jacksboro_fault_dem.tif", [([134, 86], 521.0), ([201, 172], 583.0), ([396, 339], 273.0)], None),
         (
             "sertig/sertig_valley.tif",
-            [([213, 229], 1754.481_567_4), ([320, 458], 1918.926_147_5), ([634, 912], 2560.677_002)],
+            [([213, 229], 1_754.481_567_4), ([320, 458], 1_918.926_147_5), ([634, 912], 2_560.678_222_7)],
             Some((
                 "sertig/sertig_valley_color.tif",
                 [([213, 229], [60, 99, 48]), ([320, 458], [83, 102, 68]), ([634, 912], [134, 128, 96])],

@@ -254,7 +254,7 @@ impl Layout {
         let samples = self.block[0] as usize * bands;
         let row_bytes = (samples as u64 * self.bits).div_ceil(8) as usize;
         let mut data = expand(self.compression, raw, row_bytes * rows)?;
-        if self.bits < 8 || self.bits % 8 != 0 {
+        if !self.bits.is_multiple_of(8) {
             return Ok((samples, data.chunks_exact(row_bytes).flat_map(|row| spread(row, self.bits as u32, samples)).collect()));
         }
         let bytes = self.sample.bytes();
