@@ -13,6 +13,7 @@ use crate::{
     drop,
     engine::{ExactWanted, Handle, Picture, Wanted},
     export::Exporter,
+    fonts,
     message::{Message, Outbox},
     panes,
     pulse::Pulse,
@@ -65,6 +66,8 @@ impl ExactKey {
 impl Viewer {
     /// Starts the engine; `scenario` is opened at once.
     pub fn new(context: &egui::Context, scenario: Option<PathBuf>, settings: Settings, exporter: Option<Exporter>) -> Self {
+        panes::tips::unhurried(context);
+        fonts::install(context);
         let repaint = context.clone();
         let engine = Handle::start(move || repaint.request_repaint());
         let mut state = State::new(settings, exporter);
@@ -93,6 +96,8 @@ impl Viewer {
         self.guard_close(&context, &mut out);
         out.extend(self.state.browsed());
         panes::show(ui, &self.state, &mut out);
+        // What is told of an edit stands after it, since edits take away what was told before.
+        out.sort_by_key(|message| matches!(message, Message::Refused(_)));
         out.into_iter().for_each(|message| self.state.apply(message, &context));
         self.ask();
         self.name_window(&context);

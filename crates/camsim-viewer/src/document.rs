@@ -193,12 +193,20 @@ impl Document {
 
     /// The `camsim render` that renders the document: its file with every change as `--set`.
     pub fn command_line(&self) -> String {
+        self.render_command(Path::new("frames"), None)
+    }
+
+    /// The same for a folder and for the frames from the first to before the last.
+    pub fn render_command(&self, folder: &Path, frames: Option<[u64; 2]>) -> String {
         let mut words = vec!["camsim".to_owned(), "render".to_owned(), quoted(&self.path.display().to_string())];
         for (key, value) in self.changes() {
             words.push("--set".to_owned());
             words.push(quoted(&format!("{key}={value}")));
         }
-        words.extend(["-o".to_owned(), "frames".to_owned()]);
+        if let Some([first, end]) = frames {
+            words.extend(["--frames".to_owned(), format!("{first}..{end}")]);
+        }
+        words.extend(["-o".to_owned(), quoted(&folder.display().to_string())]);
         words.join(" ")
     }
 

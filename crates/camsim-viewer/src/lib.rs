@@ -21,11 +21,15 @@ mod engine;
 
 mod export;
 
+mod fonts;
+
 mod heard;
 
 mod message;
 
 mod motion;
+
+mod orbit;
 
 mod panes;
 

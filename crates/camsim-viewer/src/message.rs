@@ -31,6 +31,8 @@ pub enum Message {
     Pin(Option<[u32; 2]>),
     /// Another value for a key; `None` leaves it out. `bool`: a hand still drags it.
     Set(String, Option<Value>, bool),
+    /// What was asked for was not taken as it was.
+    Refused(Refusal),
     /// The hand has let go.
     EndGesture,
     /// The value at opening.
@@ -73,6 +75,44 @@ pub enum Message {
     Browse,
     /// The window with the path to open or to save to; `None` closes it.
     Ask(Option<Question>),
+}
+
+impl Message {
+    /// Whether it gives the scenario other values.
+    pub fn edits_scenario(&self) -> bool {
+        matches!(
+            self,
+            Self::Set(..)
+                | Self::Reset(_)
+                | Self::Camera(_)
+                | Self::Undo
+                | Self::Redo
+                | Self::Open(_)
+                | Self::OpenAnyway(_)
+                | Self::Drop(_)
+        )
+    }
+
+    /// Whether it sets something of the window alone.
+    pub fn edits_window(&self) -> bool {
+        matches!(self, Self::Seek(_) | Self::Step(_) | Self::Timeline(_) | Self::View(_))
+    }
+}
+
+/// A value that was not taken as a hand gave it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// The key, with the place in its list, or another field's name.
+    pub name: String,
+    /// What was wrong, what is legal, and which value is in force.
+    pub text: String,
+}
+
+impl Refusal {
+    /// The name without a place in a list.
+    pub fn key(&self) -> &str {
+        self.name.split('[').next().unwrap_or(&self.name)
+    }
 }
 
 /// What a path is asked for.

@@ -6,15 +6,19 @@ mod inspector;
 mod map;
 mod menu;
 mod notices;
+mod numbers;
 pub(crate) mod parameters;
 mod plan;
 mod plots;
 pub mod shortcuts;
+pub(crate) mod space;
 mod timeline;
+pub(crate) mod tips;
 mod widgets;
 
 use eframe::egui;
 
+use self::tips::Aside;
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -50,6 +54,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
             .show(ui, |ui| pages(ui, state, out));
     }
     egui::CentralPanel::default().frame(egui::Frame::central_panel(&style).fill(egui::Color32::TRANSPARENT)).show(ui, |ui| {
+        Aside::Below(egui::Rangef::point(ui.max_rect().top())).set(ui.ctx());
         notices::show(ui, state, out);
         image_view::show(ui, state, out);
     });
@@ -80,6 +85,7 @@ fn hovering(context: &egui::Context) {
 }
 
 fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
+    Aside::Left(ui.max_rect().x_range()).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
         for tab in Tab::ALL {
             if ui.selectable_label(state.view.tab == tab, tab.label()).clicked() {
@@ -93,6 +99,7 @@ fn pages(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
         Tab::Plan => plan::show(ui, state),
         Tab::Plots => plots::show(ui, state, out),
         Tab::Map => map::show(ui, state, out),
+        Tab::Space => space::show(ui, state, out),
         Tab::Export => export::show(ui, state, out),
     });
 }

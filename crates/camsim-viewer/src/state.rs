@@ -14,7 +14,7 @@ use crate::{
     engine::{ExactWanted, Picture, Reply, Size, Stage, Wanted},
     export::{ExportJob, Exporter},
     heard::Heard,
-    message::{Message, Question},
+    message::{Message, Question, Refusal},
     settings::Settings,
     timeline::Timeline,
     view::{Compare, Tab, View},
@@ -61,6 +61,8 @@ pub struct State {
     pub notices: Vec<String>,
     /// What was done, for a moment.
     pub news: Option<News>,
+    /// What was last asked for and not taken as it was; gone with the next edit.
+    pub refused: Option<Refusal>,
     /// Pixel under the cursor.
     pub hovered: Option<[u32; 2]>,
     /// Pixel that is kept in the inspector.
@@ -95,6 +97,7 @@ impl State {
             heard: Heard::default(),
             notices: Vec::new(),
             news: None,
+            refused: None,
             hovered: None,
             pinned: None,
             help: false,
@@ -211,6 +214,10 @@ impl State {
 
     /// Does what a pane wishes. What only the window can do is left to it.
     pub fn apply(&mut self, message: Message, context: &egui::Context) {
+        let of_scenario = |refusal: &Refusal| self.document.as_ref().is_some_and(|document| document.value(refusal.key()).is_some());
+        if message.edits_scenario() || message.edits_window() && !self.refused.as_ref().is_some_and(of_scenario) {
+            self.refused = None;
+        }
         if self.apply_to_document(&message, context) {
             self.touch();
             return;
@@ -228,6 +235,7 @@ impl State {
             Message::Timeline(timeline) => self.timeline = timeline,
             Message::View(view) => self.view = view,
             Message::Tab(tab) => self.view.tab = tab,
+            Message::Refused(refusal) => self.refused = Some(refusal),
             Message::Hover(pixel) => self.hovered = pixel,
             Message::Pin(pixel) => self.pinned = pixel,
             Message::Dismiss(at) if at < self.notices.len() => {

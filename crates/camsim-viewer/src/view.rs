@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::Stage;
+use crate::{engine::Stage, orbit::Orbit};
 
 /// How two pictures are held against each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -62,13 +62,15 @@ pub enum Tab {
     Plots,
     /// The flight from above.
     Map,
+    /// The flight in three dimensions.
+    Space,
     /// Rendering to files.
     Export,
 }
 
 impl Tab {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Pixel, Self::Plan, Self::Plots, Self::Map, Self::Export];
+    pub const ALL: [Self; 6] = [Self::Pixel, Self::Plan, Self::Plots, Self::Map, Self::Space, Self::Export];
 
     /// For buttons.
     pub fn label(self) -> &'static str {
@@ -77,6 +79,7 @@ impl Tab {
             Self::Plan => "Plan",
             Self::Plots => "Plots",
             Self::Map => "Map",
+            Self::Space => "3D",
             Self::Export => "Export",
         }
     }
@@ -106,6 +109,8 @@ pub struct View {
     pub tab: Tab,
     /// Whether plots show the tracker's errors, not log and tracker.
     pub plot_errors: bool,
+    /// Where the 3D page is seen from.
+    pub orbit: Orbit,
 }
 
 impl Default for View {
@@ -121,6 +126,7 @@ impl Default for View {
             overlays: Overlays::default(),
             tab: Tab::Pixel,
             plot_errors: false,
+            orbit: Orbit::default(),
         }
     }
 }

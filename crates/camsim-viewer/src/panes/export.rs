@@ -1,12 +1,26 @@
 //! Rendering a range of frames to files, as `camsim render` does.
 
-use eframe::egui::{self, Role, Ui};
+use camsim_core::scenario::Channel;
+use eframe::egui::{self, RichText, Role, Ui};
 
-use super::widgets::named;
+use super::{
+    numbers::{self, Field},
+    parameters,
+    tips::Explained,
+    widgets::named,
+};
 use crate::{
     message::{ExportWish, Message, Outbox},
     state::State,
 };
+
+/// What the page keeps of a scenario from pass to pass.
+#[derive(Clone)]
+struct Kept {
+    folder: String,
+    /// First and last frame; `None` for those of the loop, or all.
+    frames: Option<[u64; 2]>,
+}
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -18,26 +32,72 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.label("this window was opened without a renderer to files; use `camsim render`");
         return;
     }
-    ui.label("Renders frames to files with every channel and format that [output] names, as `camsim render` does.");
+    ui.label("Renders frames to files: the same as `camsim render` writes with these keys of [output].");
     // Another scenario's frames go beside that one.
-    let id = egui::Id::unique(("export folder", &document.path));
+    let id = egui::Id::unique(("export", &document.path));
     let start = || document.path.parent().unwrap_or(std::path::Path::new("")).join("frames").display().to_string();
-    let mut folder = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(start);
-    let edit = ui.add(egui::TextEdit::singleline(&mut folder).desired_width(f32::INFINITY).hint_text("folder"));
+    let mut kept = ui.data(|data| data.get_temp::<Kept>(id)).unwrap_or_else(|| Kept { folder: start(), frames: None });
+    let edit = ui.add(egui::TextEdit::singleline(&mut kept.folder).desired_width(f32::INFINITY).hint_text("folder"));
     named(&edit, Role::TextInput, "folder");
-    ui.data_mut(|data| data.insert_temp(id, folder.clone()));
-    let [first, last] = state.timeline.bounds();
-    let frames = [first, last + 1];
-    ui.label(match state.timeline.range {
-        Some(_) => format!("frames {first} to {last}, the loop's"),
-        None => format!("all {} frames; set a loop in the timeline for fewer", last + 1),
-    });
+    let [first, last] = frames(ui, state, &mut kept.frames, out);
+    ui.data_mut(|data| data.insert_temp(id, kept.clone()));
+    let wish = ExportWish { folder: kept.folder.into(), frames: [first, last + 1] };
+    parameters::rows(ui, state, "output", out);
+    let output = &document.scenario.output;
+    if output.format.is_empty() {
+        let text = "no file format: frames are rendered, but no pictures are written";
+        ui.label(RichText::new(text).color(ui.visuals().warn_fg_color));
+    } else if !output.channels.contains(&Channel::Color) {
+        ui.weak("without color no pictures are written");
+    }
     let running = state.export.as_ref().is_some_and(|job| job.progress().ended.is_none());
-    let may_start = !running && !folder.is_empty() && state.timeline.frames > 0 && document.problems.is_empty();
-    if ui.add_enabled(may_start, egui::Button::new("Render")).on_hover_text("to this folder").clicked() {
-        out.push(Message::Export(ExportWish { folder: folder.into(), frames }));
+    let may_start = !running && !wish.folder.as_os_str().is_empty() && state.timeline.frames > 0 && document.problems.is_empty();
+    if ui.add_enabled(may_start, egui::Button::new("Render")).explained("to this folder").clicked() {
+        out.push(Message::Export(wish.clone()));
     }
     progress(ui, state, out);
+    egui::CollapsingHeader::new("as a command line").show(ui, |ui| {
+        let left_out = document.left_out();
+        if !left_out.is_empty() {
+            ui.label(format!("{} is left out, which a command line cannot say: save the scenario first", left_out.join(", ")));
+        }
+        ui.add(egui::Label::new(RichText::new(document.render_command(&wish.folder, Some(wish.frames))).monospace()).wrap());
+    });
+}
+
+/// First and last frame, which may be others than the loop's.
+fn frames(ui: &mut Ui, state: &State, chosen: &mut Option<[u64; 2]>, out: &mut Outbox) -> [u64; 2] {
+    let timeline = &state.timeline;
+    let all_last = timeline.last();
+    let [mut first, mut last] = chosen.map_or(timeline.bounds(), |frames| frames.map(|frame| frame.min(all_last)));
+    ui.horizontal_wrapped(|ui| {
+        ui.label("frames");
+        let field =
+            |name, tip| Field { name, label: "", unit: "", range: [0.0, all_last as f64], speed: 0.2, decimals: 0, whole: true, tip };
+        if let Some((frame, _)) = numbers::number(ui, &field("first frame to render", "the first one"), first as f64, out) {
+            first = frame as u64;
+            last = last.max(first);
+            *chosen = Some([first, last]);
+        }
+        ui.label("to");
+        if let Some((frame, _)) =
+            numbers::number(ui, &field("last frame to render", "the last one, which is rendered, too"), last as f64, out)
+        {
+            last = frame as u64;
+            first = first.min(last);
+            *chosen = Some([first, last]);
+        }
+        if chosen.is_some() && ui.small_button("as the timeline").explained("the loop's frames, or all").clicked() {
+            *chosen = None;
+        }
+    });
+    let count = last + 1 - first;
+    ui.weak(match (chosen, timeline.range) {
+        (Some(_), _) => format!("{count} of {} frames", timeline.frames),
+        (None, Some(_)) => format!("{count} frames, the loop's"),
+        (None, None) => format!("all {} frames; set a loop in the timeline, or type, for fewer", timeline.frames),
+    });
+    [first, last]
 }
 
 fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
@@ -61,7 +121,7 @@ fn progress(ui: &mut Ui, state: &State, out: &mut Outbox) {
             ui.label(text);
         }
         Some(Err(text)) => {
-            ui.label(egui::RichText::new(text).color(ui.visuals().error_fg_color));
+            ui.label(RichText::new(text).color(ui.visuals().error_fg_color));
         }
     }
 }

@@ -12,7 +12,10 @@ use camsim_io::write::srgb8;
 use eframe::egui::{self, Ui};
 use glam::DVec2;
 
-use super::widgets::{fact, facts, fixed, signed};
+use super::{
+    tips::Explained,
+    widgets::{fact, facts, fixed, signed},
+};
 use crate::{
     heard::Sight,
     message::{Message, Outbox},
@@ -31,7 +34,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
     };
     ui.horizontal(|ui| {
         ui.heading(format!("pixel ({}, {})", pixel[0], pixel[1]));
-        if state.pinned.is_some() && ui.button("let go").on_hover_text("follow the cursor again (Esc)").clicked() {
+        if state.pinned.is_some() && ui.button("let go").explained("follow the cursor again (Esc)").clicked() {
             out.push(Message::Pin(None));
         }
     });

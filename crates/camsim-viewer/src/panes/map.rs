@@ -1,13 +1,13 @@
 //! The flight from above: track, terrain, what stands on it, where the camera is and what it sees of the ground. A click jumps to the nearest frame.
 
-mod chart;
-mod footprint;
+pub(super) mod chart;
+pub(super) mod footprint;
 
 use std::sync::{Arc, Weak};
 
 use camsim_core::{camera::CameraModel, pose::CameraPose, sequence::Sequence};
 use eframe::egui::{Color32, Id, Painter, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use self::chart::Chart;
 use super::widgets::fixed;
@@ -24,11 +24,12 @@ const LOOK: f64 = 0.08;
 
 /// The page.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
-    let (Some(sequence), Some(stamp_s)) = (state.heard.sequence(), state.heard.stamp_s(state.timeline.frame)) else {
+    let (Some(loaded), Some(stamp_s)) = (&state.heard.loaded, state.heard.stamp_s(state.timeline.frame)) else {
         ui.label("no flight yet");
         return;
     };
-    let chart = chart::chart(ui, sequence);
+    let sequence = &loaded.sequence;
+    let chart = chart::chart(ui, loaded);
     let side = ui.available_width().max(60.0);
     let (rect, response) = ui.allocate_exact_size(vec2(side, side), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "map: click to jump"));
@@ -67,14 +68,14 @@ fn background(painter: &Painter, chart: &Chart, text: Color32, screen: &impl Fn(
         painter.image(relief.id(), corners, uv, Color32::WHITE);
     }
     for [low, high] in chart.boxes.iter() {
-        let rect = Rect::from_two_pos(screen(*low), screen(*high));
+        let rect = Rect::from_two_pos(screen(low.truncate()), screen(high.truncate()));
         let seen = Rect::from_center_size(rect.center(), rect.size().max(vec2(2.0, 2.0)));
         painter.rect_filled(seen, 0.0, OF_THINGS.gamma_multiply(0.6));
     }
     for corners in chart.flats.iter() {
-        painter.add(Shape::closed_line(corners.map(screen).to_vec(), Stroke::new(2.0, OF_THINGS)));
+        painter.add(Shape::closed_line(corners.map(|corner| screen(corner.truncate())).to_vec(), Stroke::new(2.0, OF_THINGS)));
     }
-    let points: Vec<Pos2> = chart.track.iter().map(|(ne, _)| screen(*ne)).collect();
+    let points: Vec<Pos2> = chart.track.iter().map(|(ned, _)| screen(ned.truncate())).collect();
     // A relief is dark in both themes.
     let color = if chart.relief.is_some() { Color32::WHITE } else { text };
     painter.add(Shape::line(points, Stroke::new(1.5, color)));
@@ -84,7 +85,7 @@ fn background(painter: &Painter, chart: &Chart, text: Color32, screen: &impl Fn(
 fn seen(
     painter: &Painter,
     camera: &CameraModel,
-    footprint: &[Vec<DVec2>],
+    footprint: &[Vec<DVec3>],
     pose: &CameraPose,
     look_m: f64,
     screen: &impl Fn(DVec2) -> Pos2,
@@ -92,7 +93,7 @@ fn seen(
     let place = pose.position_ned_m.truncate();
     let here = screen(place);
     for part in footprint {
-        let on_screen: Vec<Pos2> = part.iter().map(|ne| screen(*ne)).collect();
+        let on_screen: Vec<Pos2> = part.iter().map(|ned| screen(ned.truncate())).collect();
         painter.add(Shape::line(on_screen, Stroke::new(1.5, OF_CAMERA)));
     }
     for side in [DVec2::NEG_X, DVec2::X] {
@@ -105,8 +106,8 @@ fn seen(
 }
 
 /// Found once a frame: it takes hundreds of rays.
-fn footprint(ui: &Ui, sequence: &Arc<Sequence>, frame: u64, camera: &CameraModel, pose: &CameraPose) -> Arc<Vec<Vec<DVec2>>> {
-    type Kept = (Weak<Sequence>, u64, Arc<Vec<Vec<DVec2>>>);
+pub fn footprint(ui: &Ui, sequence: &Arc<Sequence>, frame: u64, camera: &CameraModel, pose: &CameraPose) -> Arc<Vec<Vec<DVec3>>> {
+    type Kept = (Weak<Sequence>, u64, Arc<Vec<Vec<DVec3>>>);
     let id = Id::unique("footprint");
     let kept = ui.data(|data| data.get_temp::<Kept>(id));
     if let Some((_, _, runs)) = kept.filter(|(of, at, _)| std::ptr::eq(of.as_ptr(), Arc::as_ptr(sequence)) && *at == frame) {
@@ -119,5 +120,6 @@ fn footprint(ui: &Ui, sequence: &Arc<Sequence>, frame: u64, camera: &CameraModel
 
 /// The time of the nearest point of the track.
 fn nearest(chart: &Chart, distance: impl Fn(DVec2) -> f32) -> Option<f64> {
-    chart.track.iter().min_by(|a, b| distance(a.0).total_cmp(&distance(b.0))).map(|(_, after_s)| *after_s)
+    let away = |place: &DVec3| distance(place.truncate());
+    chart.track.iter().min_by(|a, b| away(&a.0).total_cmp(&away(&b.0))).map(|(_, after_s)| *after_s)
 }

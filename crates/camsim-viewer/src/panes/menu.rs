@@ -4,7 +4,10 @@ use std::path::PathBuf;
 
 use eframe::egui::{self, Context, Role, Ui};
 
-use super::widgets::named;
+use super::{
+    tips::{Aside, Explained},
+    widgets::named,
+};
 use crate::{
     document::Document,
     drop::PICTURE_USES,
@@ -12,27 +15,31 @@ use crate::{
     state::{Leaving, State},
 };
 
+/// Points of a line that something is still told in.
+const SHORTEST: f32 = 160.0;
+
 /// The line.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    Aside::Below(ui.max_rect().y_range()).set(ui.ctx());
     ui.horizontal_wrapped(|ui| {
-        if ui.button("Open").on_hover_text("a scenario (Ctrl O), or drop one on the window").clicked() {
+        if ui.button("Open").explained("a scenario (Ctrl O), or drop one on the window").clicked() {
             out.push(Message::Ask(Some(open_question(state))));
         }
         ui.add_enabled_ui(state.document.is_some(), |ui| file_buttons(ui, state, out));
         ui.separator();
         let [can_undo, can_redo] = state.document.as_ref().map_or([false; 2], Document::steps);
-        if ui.add_enabled(can_undo, egui::Button::new("Undo")).on_hover_text("Ctrl Z").clicked() {
+        if ui.add_enabled(can_undo, egui::Button::new("Undo")).explained("Ctrl Z").clicked() {
             out.push(Message::Undo);
         }
-        if ui.add_enabled(can_redo, egui::Button::new("Redo")).on_hover_text("Ctrl Shift Z").clicked() {
+        if ui.add_enabled(can_redo, egui::Button::new("Redo")).explained("Ctrl Shift Z").clicked() {
             out.push(Message::Redo);
         }
         ui.separator();
         let dark = ui.visuals().dark_mode;
-        if ui.button(if dark { "Light" } else { "Dark" }).on_hover_text("colours of the window").clicked() {
+        if ui.button(if dark { "Light" } else { "Dark" }).explained("colours of the window").clicked() {
             ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
         }
-        if ui.button("?").on_hover_text("keyboard shortcuts").clicked() {
+        if ui.button("?").explained("keyboard shortcuts").clicked() {
             out.push(Message::Help(!state.help));
         }
         ui.separator();
@@ -45,10 +52,10 @@ fn file_buttons(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.label("nothing open");
         return;
     };
-    if ui.button("Save").on_hover_text("under a name of your choice (Ctrl S)").clicked() {
+    if ui.button("Save").explained("under a name of your choice (Ctrl S)").clicked() {
         out.push(Message::Ask(Some(save_question(document))));
     }
-    if ui.button("Reload").on_hover_text("read log, terrain and pictures again").clicked() {
+    if ui.button("Reload").explained("read log, terrain and pictures again").clicked() {
         out.push(Message::Reload);
     }
     ui.menu_button("Copy", |ui| {
@@ -66,12 +73,19 @@ fn status(ui: &mut Ui, state: &State) {
         let name =
             document.path.file_name().map_or_else(|| document.path.display().to_string(), |name| name.to_string_lossy().into_owned());
         let mark = if document.is_unsaved() { " (changed)" } else { "" };
-        ui.label(format!("{name}{mark}")).on_hover_text(document.path.display().to_string());
+        ui.label(format!("{name}{mark}")).explained(document.path.display().to_string());
     }
     warnings(ui, state);
     let time = |what: &str, ms: Option<f64>| ms.map(|ms| format!("{what} {ms:.0} ms"));
     let times: Vec<String> = [time("frame", state.heard.full_ms), time("preview", state.heard.preview_ms)].into_iter().flatten().collect();
-    ui.weak(times.join(", ")).on_hover_text(format!("rendered on {}", state.heard.adapter));
+    ui.weak(times.join(", ")).explained(format!("rendered on {}", state.heard.adapter));
+    if let Some(refusal) = &state.refused {
+        ui.separator();
+        let text = egui::RichText::new(format!("{}: {}", refusal.name, refusal.text)).color(ui.visuals().warn_fg_color);
+        // In what is left of the line: panes do not jump for it.
+        let room = ui.available_size_before_wrap().x.max(SHORTEST);
+        ui.allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| ui.add(egui::Label::new(text).truncate()));
+    }
     if let Some(news) = &state.news {
         ui.separator();
         ui.label(&news.text);
@@ -120,7 +134,7 @@ pub fn windows(context: &Context, state: &State, out: &mut Outbox) {
         egui::Modal::new(egui::Id::unique("dropped picture")).show(context, |ui| {
             ui.label(format!("Use {} as", path.display()));
             for (what, key) in PICTURE_USES {
-                if ui.button(what).on_hover_text(key).clicked() {
+                if ui.button(what).explained(key).clicked() {
                     out.push(Message::UsePicture(Some(key)));
                 }
             }
@@ -136,7 +150,7 @@ fn unsaved(context: &Context, leaving: &Leaving, document: &Document, out: &mut 
         ui.heading("Changes that are not saved");
         ui.label(format!("{} has changes that are in no file.", document.path.display()));
         ui.horizontal(|ui| {
-            if ui.button("Save as").on_hover_text("asks for a name; what you wanted is then asked anew").clicked() {
+            if ui.button("Save as").explained("asks for a name; what you wanted is then asked anew").clicked() {
                 out.extend([Message::Stay, Message::Ask(Some(save_question(document)))]);
             }
             let (text, wish) = match leaving {
@@ -188,7 +202,7 @@ fn ask(context: &Context, question: &Question, recent: &[PathBuf], out: &mut Out
         }
         ui.horizontal(|ui| {
             done |= ui.button(if question.saves { "Save here" } else { "Open this" }).clicked();
-            if ui.button("Browse...").on_hover_text("the desktop's own file dialog").clicked() {
+            if ui.button("Browse...").explained("the desktop's own file dialog").clicked() {
                 out.push(Message::Browse);
             }
             open = !ui.button("Cancel").clicked();
@@ -218,7 +232,7 @@ fn entries(ui: &mut Ui, path: &mut String, done: &mut bool) {
     found.sort();
     found.reverse();
     egui::ScrollArea::vertical().max_height(200.0).show(ui, |ui| {
-        if let Some(parent) = folder.parent().filter(|_| ui.selectable_label(false, "..").on_hover_text("the folder above").clicked()) {
+        if let Some(parent) = folder.parent().filter(|_| ui.selectable_label(false, "..").explained("the folder above").clicked()) {
             *path = parent.display().to_string();
         }
         found.sort_by(|a, b| (b.0, &a.1).cmp(&(a.0, &b.1)));

@@ -2,7 +2,10 @@
 
 use eframe::egui;
 
-use super::widgets::{named, waiting};
+use super::{
+    tips::Explained,
+    widgets::{named, waiting},
+};
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -19,7 +22,7 @@ pub fn show(ui: &mut egui::Ui, state: &State, out: &mut Outbox) {
     for (at, notice) in state.notices.iter().enumerate() {
         ui.horizontal(|ui| {
             let name = format!("dismiss: {notice}");
-            let dismiss = ui.small_button("x").on_hover_text(&name);
+            let dismiss = ui.small_button("x").explained(&name);
             named(&dismiss, egui::Role::Button, &name);
             if dismiss.clicked() {
                 out.push(Message::Dismiss(at));

@@ -9,7 +9,10 @@ use std::sync::LazyLock;
 use camsim_io::scenario_file::{Kind, keys};
 use eframe::egui::{self, RichText, Role, Ui};
 
-use super::widgets::named;
+use super::{
+    tips::{Aside, Explained},
+    widgets::named,
+};
 use crate::{
     document::Document,
     message::{Message, Outbox},
@@ -23,10 +26,11 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.label("nothing open");
         return;
     };
+    Aside::Right(ui.max_rect().x_range()).set(ui.ctx());
     presets::show(ui, out);
     egui::ScrollArea::vertical().id_salt("parameters").auto_shrink(false).show(ui, |ui| {
         for group in groups() {
-            section(ui, document, group, out);
+            section(ui, state, document, group, out);
         }
     });
 }
@@ -70,7 +74,7 @@ impl Group {
     }
 }
 
-fn section(ui: &mut Ui, document: &Document, group: &Group, out: &mut Outbox) {
+fn section(ui: &mut Ui, state: &State, document: &Document, group: &Group, out: &mut Outbox) {
     let changed = group.keys.iter().any(|(key, _)| document.is_changed(key));
     let wrong = group.keys.iter().any(|(key, _)| document.problem(key).is_some());
     let mut title = RichText::new(group.title()).strong();
@@ -83,21 +87,29 @@ fn section(ui: &mut Ui, document: &Document, group: &Group, out: &mut Outbox) {
     egui::CollapsingHeader::new(title).id_salt(group.name).default_open(open).show(ui, |ui| {
         for (key, kind) in &group.keys {
             match kind {
-                Kind::Tables => lists::show(ui, document, key, out),
-                kind => row(ui, document, key, *kind, out),
+                Kind::Tables => lists::show(ui, state, document, key, out),
+                kind => row(ui, state, document, key, *kind, out),
             }
         }
     });
 }
 
+/// The keys of a table, for another page.
+pub fn rows(ui: &mut Ui, state: &State, name: &str, out: &mut Outbox) {
+    let Some(document) = &state.document else { return };
+    for (key, kind) in groups().iter().filter(|group| group.name == name).flat_map(|group| &group.keys) {
+        row(ui, state, document, key, *kind, out);
+    }
+}
+
 /// A key: its name, its value, its unit; what was changed can be reset.
-fn row(ui: &mut Ui, document: &Document, key: &str, kind: Kind, out: &mut Outbox) {
+fn row(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, out: &mut Outbox) {
     let Some(param) = params::of(key) else { return };
-    row_at(ui, document, key, kind, param, out);
+    row_at(ui, state, document, key, kind, param, out);
 }
 
 /// The same for an element of a list, whose key has an index that its facts have not.
-fn row_at(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
+fn row_at(ui: &mut Ui, state: &State, document: &Document, key: &str, kind: Kind, param: &Param, out: &mut Outbox) {
     let leaf = key.rsplit('.').next().unwrap_or(key);
     let changed = document.is_changed(key);
     let problem = document.problem(key);
@@ -108,14 +120,14 @@ fn row_at(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param
         text = text.color(ui.visuals().hyperlink_color).strong();
     }
     ui.horizontal_wrapped(|ui| {
-        ui.label(text).on_hover_text(format!("{key}: {}", param.tip));
+        ui.label(text).explained(format!("{key}: {}", param.tip));
         editors::show(ui, document, key, kind, param, out);
         if !param.unit.is_empty() {
             ui.weak(param.unit);
         }
         if changed {
             let name = format!("reset {key}");
-            let reset = ui.small_button("reset").on_hover_text(format!("{name} to {}", opened(document, key)));
+            let reset = ui.small_button("reset").explained(format!("{name} to {}", opened(document, key)));
             named(&reset, Role::Button, &name);
             if reset.clicked() {
                 out.push(Message::Reset(key.to_owned()));
@@ -124,6 +136,9 @@ fn row_at(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Param
     });
     if let Some(problem) = problem {
         ui.label(RichText::new(&problem.message).color(ui.visuals().error_fg_color).small());
+    }
+    if let Some(refusal) = state.refused.as_ref().filter(|refusal| refusal.key() == key) {
+        ui.label(RichText::new(&refusal.text).color(ui.visuals().warn_fg_color).small());
     }
 }
 

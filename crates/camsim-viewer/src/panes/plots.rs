@@ -6,7 +6,10 @@ use camsim_io::load::Loaded;
 use eframe::egui::{self, Color32, Rangef, Ui};
 use egui_plot::{AxisHints, HLine, Line, Plot, PlotPoints, Points, VLine};
 
-use super::widgets::{choice, waiting};
+use super::{
+    tips::Explained,
+    widgets::{choice, waiting},
+};
 use crate::{
     message::{Message, Outbox},
     series::{Channel, Desk, Series},
@@ -59,10 +62,10 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
         ui.separator();
         if !view.plot_errors {
             for (name, color) in [("log", LINES[0]), ("tracker", LINES[1])] {
-                ui.colored_label(color, name).on_hover_text("the colour of its line");
+                ui.colored_label(color, name).explained("the colour of its line");
             }
         }
-        ui.weak("Ctrl+wheel zooms").on_hover_text(
+        ui.weak("Ctrl+wheel zooms").explained(
             "in time, at the pointer; also a box with the right button. Dragging moves on, a double click shows all. What is seen is worked out anew, \
              and where there are few rows of the log each has a dot. Numbers beside the names are of the whole flight",
         );

@@ -6,7 +6,11 @@ use camsim_core::{sequence::Sequence, shutter::Shutter};
 use camsim_io::load::Loaded;
 use eframe::egui::{self, Color32, Rect, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use super::widgets::{fixed, named, signed};
+use super::{
+    numbers::{self, Field},
+    tips::{Aside, Explained},
+    widgets::{fixed, named, signed},
+};
 use crate::{
     message::{Message, Outbox},
     state::State,
@@ -20,6 +24,7 @@ const ROWS: f32 = 34.0;
 
 /// The pane.
 pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
+    Aside::Above(ui.max_rect().y_range()).set(ui.ctx());
     ui.add_space(2.0);
     ui.add_enabled_ui(state.timeline.frames > 0, |ui| {
         ui.horizontal_wrapped(|ui| controls(ui, state, out));
@@ -32,7 +37,7 @@ pub fn show(ui: &mut Ui, state: &State, out: &mut Outbox) {
 fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     let timeline = &state.timeline;
     let mut button = |ui: &mut Ui, text: &str, name: &str, message: Message| {
-        let response = ui.button(text).on_hover_text(name);
+        let response = ui.button(text).explained(name);
         named(&response, Role::Button, name);
         if response.clicked() {
             out.push(message);
@@ -44,33 +49,49 @@ fn controls(ui: &mut Ui, state: &State, out: &mut Outbox) {
     button(ui, ">", "next frame", Message::Step(1));
     button(ui, ">|", "last frame", Message::Seek(timeline.bounds()[1]));
     let mut changed = timeline.clone();
-    let speed = ui.add(egui::Slider::new(&mut changed.speed, SPEEDS[0]..=SPEEDS[1]).logarithmic(true).suffix("x").max_decimals(2));
-    named(&speed, Role::Slider, "speed");
+    let field = Field {
+        name: "speed",
+        label: "",
+        unit: "x",
+        range: SPEEDS,
+        speed: 0.01,
+        decimals: 2,
+        whole: false,
+        tip: "of play, times the flight's own time",
+    };
+    changed.speed = numbers::slider(ui, &field, timeline.speed, out);
     loop_controls(ui, timeline, &mut changed);
     if changed != *timeline {
         out.push(Message::Timeline(changed));
     }
     ui.separator();
-    let mut seconds = timeline.seconds(timeline.frame);
     let last_s = timeline.seconds(timeline.last());
-    let time = ui.add(egui::DragValue::new(&mut seconds).range(0.0..=last_s).speed(0.5 / timeline.fps).suffix(" s").max_decimals(4));
-    named(&time, Role::SpinButton, "time");
-    if time.on_hover_text("from the beginning of the window; click to type a time").changed() {
+    let field = Field {
+        name: "time",
+        label: "",
+        unit: "s",
+        range: [0.0, last_s],
+        speed: 0.5 / timeline.fps,
+        decimals: 4,
+        whole: false,
+        tip: "from the beginning of the window; click to type a time",
+    };
+    if let Some((seconds, _)) = numbers::number(ui, &field, timeline.seconds(timeline.frame), out) {
         out.push(Message::Seek(timeline.frame_at(seconds)));
     }
     ui.label(format!("of {last_s:.2} s"));
     let flight = state.heard.stamp_s(timeline.frame).map_or_else(String::new, |t_s| format!(", flight time {} s", fixed(t_s, 3)));
     ui.label(format!("frame {} of {}{flight}", timeline.frame, timeline.frames))
-        .on_hover_text("frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row");
+        .explained("frames are counted from 0; flight time is that of the frame's stamp, from the log's first good row");
 }
 
 fn loop_controls(ui: &mut Ui, timeline: &Timeline, changed: &mut Timeline) {
     let [first, last] = timeline.bounds();
     let frame = timeline.frame;
-    if ui.button("loop from").on_hover_text("the loop begins at this frame").clicked() && frame < timeline.last() {
+    if ui.button("loop from").explained("the loop begins at this frame").clicked() && frame < timeline.last() {
         changed.range = Some([frame, if last > frame { last } else { timeline.last() }]);
     }
-    if ui.button("loop to").on_hover_text("the loop ends at this frame").clicked() && frame > 0 {
+    if ui.button("loop to").explained("the loop ends at this frame").clicked() && frame > 0 {
         changed.range = Some([if first < frame { first } else { 0 }, frame]);
     }
     if let Some([first, last]) = timeline.range
@@ -124,7 +145,7 @@ fn bar(ui: &mut Ui, state: &State, out: &mut Outbox) {
     } else if timeline.dragged {
         out.push(Message::Timeline(Timeline { dragged: false, ..timeline.clone() }));
     }
-    response.on_hover_ui(|ui| log_report(ui, state));
+    response.explained_by(|ui| log_report(ui, state));
 }
 
 /// Spans without rows of the log as far as they are on the timeline, in frames, in order.
@@ -194,6 +215,5 @@ fn row_times(ui: &mut Ui, state: &State) {
     // Left of the next frame's line.
     let at = pos2(x_of(period_s).min(rect.right()) - 4.0, rect.top() + 2.0);
     painter.text(at, egui::Align2::RIGHT_TOP, text, egui::FontId::proportional(11.0), ui.visuals().text_color());
-    response
-        .on_hover_text("each row's exposure about the frame's stamp (red), with the periods of the frames beside it; time to the right");
+    response.explained("each row's exposure about the frame's stamp (red), with the periods of the frames beside it; time to the right");
 }

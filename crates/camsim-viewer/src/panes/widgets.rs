@@ -4,6 +4,8 @@ use std::{f32::consts::TAU, time::Duration};
 
 use eframe::egui::{self, Response, Role, Sense, Shape, Stroke, Ui, WidgetInfo, vec2};
 
+use super::tips::Explained;
+
 /// Time between two looks at [`waiting`].
 const BEAT: Duration = Duration::from_millis(250);
 /// Steps of it in a turn.
@@ -11,7 +13,7 @@ const BEATS: u64 = 8;
 
 /// One choice of several. `name` is what assistive technology and tests call it, where the text alone would not tell.
 pub fn choice(ui: &mut Ui, selected: bool, text: &str, name: &str, explanation: &str) -> Response {
-    let response = ui.selectable_label(selected, text).on_hover_text(explanation);
+    let response = ui.selectable_label(selected, text).explained(explanation);
     response.widget_info(|| WidgetInfo::selected(Role::RadioButton, ui.is_enabled(), selected, name));
     response
 }
@@ -39,7 +41,7 @@ pub fn named(response: &Response, kind: Role, name: &str) {
 
 /// A row of a table: what, and how much. The value can be selected and copied.
 pub fn fact(ui: &mut Ui, what: &str, value: impl Into<String>, explanation: &str) {
-    ui.label(egui::RichText::new(what).weak()).on_hover_text(explanation);
+    ui.label(egui::RichText::new(what).weak()).explained(explanation);
     ui.label(value.into());
     ui.end_row();
 }

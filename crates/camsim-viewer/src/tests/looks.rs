@@ -51,6 +51,6 @@ fn panes_look_as_they_did() {
     window.snapshot("plan", part.with_max_x(right + 180.0));
     window.state_mut().view.tab = Tab::Export;
     (0..2).for_each(|_| window.step());
-    let part = rows(&window, page, "all 60 frames; set a loop in the timeline for fewer", "Render");
+    let part = rows(&window, page, "all 60 frames; set a loop in the timeline, or type, for fewer", "Render");
     window.snapshot("export", part);
 }

@@ -1,8 +1,15 @@
 //! The pages on the right, the shortcuts, and windows in odd states.
 
-use std::sync::{Arc, Mutex, mpsc::channel};
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex, mpsc::channel},
+};
 
-use camsim_core::{camera::CameraModel, shutter::Shutter};
+use camsim_core::{
+    camera::CameraModel,
+    scenario::{Channel, ExrCompression, ExrPixel, ImageFormat, OutputSpec},
+    shutter::Shutter,
+};
 use eframe::egui::{self, Key};
 use egui_kittest::kittest::Queryable;
 use glam::DVec2;
@@ -120,6 +127,60 @@ fn an_export_shows_progress_and_can_be_cancelled() {
 
 #[test]
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
+fn an_export_has_the_channels_formats_frames_and_folder_of_its_page() {
+    type Seen = (OutputSpec, [u64; 2], PathBuf);
+    let seen: Arc<Mutex<Vec<Seen>>> = Arc::default();
+    let of_exporter = seen.clone();
+    let exporter: crate::Exporter = Arc::new(move |job| {
+        of_exporter.lock().expect("one at a time").push((job.scenario.output.clone(), job.frames, job.folder.clone()));
+        Ok("all written".into())
+    });
+    let mut window = Window::with(Some(pattern()), Some(exporter), [1280.0, 800.0]);
+    window.settle();
+    let before = window.state().document.as_ref().expect("open").scenario.output.clone();
+    window.click("Export");
+    for name in ["output.channels: depth", "output.channels: coords", "output.format: png"] {
+        window.click(name);
+    }
+    for (name, choice) in [("output.exr_pixel", "float"), ("output.exr_compression", "piz")] {
+        window.click(name);
+        window.click(choice);
+    }
+    for (name, frame) in [("first frame to render", 3.0), ("last frame to render", 7.0)] {
+        window.harness.get_by_label(name).set_value_accesskit(frame);
+        (0..3).for_each(|_| window.step());
+    }
+    assert!(has(&window, "5 of 60 frames"));
+    window.harness.get_by_label("folder").set_text_value_accesskit("/tmp/some where");
+    window.step();
+    window.click("as a command line");
+    (0..40).for_each(|_| window.step());
+    let flip = |set: bool| !set;
+    let mut expected = before.clone();
+    for channel in [Channel::Depth, Channel::Coords] {
+        if flip(before.channels.contains(&channel)) { expected.channels.push(channel) } else { expected.channels.retain(|c| *c != channel) }
+    }
+    let png = ImageFormat::Png;
+    if flip(before.format.contains(&png)) {
+        expected.format.push(png)
+    } else {
+        expected.format.retain(|f| *f != png)
+    }
+    (expected.exr_pixel, expected.exr_compression) = (ExrPixel::Float, ExrCompression::Piz);
+    expected.channels.sort_by_key(|channel| *channel as u8);
+    // What the page says of it is what `camsim render` would be told.
+    let commands: Vec<_> = window.harness.query_all_by_label_contains("--frames 3..8 -o '/tmp/some where'").collect();
+    assert_eq!(commands.len(), 1);
+    window.click("Render");
+    window.wait("the end", |state| state.export.as_ref().is_some_and(|job| job.progress().ended.is_some()));
+    assert_eq!(*seen.lock().expect("over"), [(expected, [3, 8], PathBuf::from("/tmp/some where"))]);
+    assert_eq!(window.state().timeline.range, None, "the loop is another thing");
+    window.click("as the timeline");
+    assert!(has(&window, "all 60 frames; set a loop in the timeline, or type, for fewer"));
+}
+
+#[test]
+#[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn shortcuts_are_listed_and_colours_change() {
     let mut window = Window::open(Some(pattern()));
     window.settle();
@@ -182,7 +243,7 @@ fn nothing_open_and_a_log_of_ten_hours() {
     assert!(window.state().timeline.frames > 1_000_000, "{:?}", window.state().timeline);
     send(&mut window, Message::Seek(900_000));
     window.settle();
-    for tab in ["Plots", "Map", "Pixel"] {
+    for tab in ["Plots", "Map", "3D", "Pixel"] {
         window.click(tab);
         window.step();
         if tab == "Plots" {

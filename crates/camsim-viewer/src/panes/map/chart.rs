@@ -4,18 +4,22 @@ use std::sync::{Arc, Weak};
 
 use camsim_core::{
     camera::CameraModel,
-    scene::{Scene, Terrain},
+    flight_log::FlightLog,
+    scene::{Mesh, Scene, Terrain},
     sequence::Sequence,
     trajectory::Trajectory,
 };
+use camsim_io::load::Loaded;
 use eframe::egui::{Color32, ColorImage, Id, TextureHandle, TextureOptions, Ui};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::footprint::{footprint, is_flat};
 use crate::panes::ramp_color;
 
 /// Points of the track.
 const POINTS: u64 = 1000;
+/// Rows of the log, at most.
+const MOST_ROWS: usize = 600;
 /// Pixels of the relief along a side.
 const RELIEF_PX: usize = 128;
 /// What the camera sees farther away does not make the map larger.
@@ -29,16 +33,20 @@ const SMALLEST_M: f64 = 2.0;
 #[derive(Clone)]
 pub struct Chart {
     of: Key,
-    /// North and east, metres, with the time after the first frame, seconds.
-    pub track: Arc<Vec<(DVec2, f64)>>,
+    /// The camera's way, NED, with the time after the first frame, seconds.
+    pub track: Arc<Vec<(DVec3, f64)>>,
+    /// The platform's way, NED.
+    pub flown: Arc<Vec<DVec3>>,
+    /// Rows of the log within the window, NED: all of them if they are few.
+    pub log: Arc<Vec<DVec3>>,
     /// South-west and north-east corner.
     pub bounds: [DVec2; 2],
     /// Heights by colour.
     pub relief: Option<TextureHandle>,
     /// Corners of patterns and boards, all around.
-    pub flats: Arc<Vec<[DVec2; 4]>>,
-    /// Boxes around parts of models: south-west and north-east corner.
-    pub boxes: Arc<Vec<[DVec2; 2]>>,
+    pub flats: Arc<Vec<[DVec3; 4]>>,
+    /// Boxes around parts of models, NED: the least and the largest of each coordinate.
+    pub boxes: Arc<Vec<[DVec3; 2]>>,
 }
 
 /// What it depends on: not on the camera, so that a dragged parameter does not draw it anew.
@@ -68,7 +76,8 @@ impl Key {
 }
 
 /// The last one, or another for another sequence.
-pub fn chart(ui: &Ui, sequence: &Sequence) -> Chart {
+pub fn chart(ui: &Ui, loaded: &Loaded) -> Chart {
+    let sequence = &*loaded.sequence;
     let id = Id::unique("map chart");
     let of = Key::of(sequence);
     if let Some(chart) = ui.data(|data| data.get_temp::<Chart>(id)).filter(|chart| chart.of.is(&of)) {
@@ -78,14 +87,26 @@ pub fn chart(ui: &Ui, sequence: &Sequence) -> Chart {
     let last = sequence.frames.saturating_sub(1);
     let count = POINTS.min(last + 1).max(1);
     let frames = (0..count).map(|k| if count > 1 { (u128::from(k) * u128::from(last) / u128::from(count - 1)) as u64 } else { 0 });
-    let place = |frame: u64| sequence.path.pose(stamp_s(frame)).position_ned_m.truncate();
-    let track: Vec<(DVec2, f64)> = frames.map(|frame| (place(frame), stamp_s(frame) - stamp_s(0))).collect();
+    let place = |frame: u64| sequence.path.pose(stamp_s(frame)).position_ned_m;
+    let flown = frames.clone().map(|frame| sequence.path.trajectory.state(stamp_s(frame)).position_ned_m).collect();
+    let track: Vec<(DVec3, f64)> = frames.map(|frame| (place(frame), stamp_s(frame) - stamp_s(0))).collect();
     let seen = CameraModel::from_spec(&sequence.scenario.camera).map_or_else(|_| Vec::new(), |camera| seen(sequence, &camera));
     let (flats, boxes) = things(&sequence.scene);
-    let bounds = bounds(track.iter().map(|(ne, _)| *ne).chain(seen), flats.iter().map(around).chain(boxes.iter().copied()));
+    let from_above = |corners: &[DVec3; 2]| corners.map(DVec3::truncate);
+    let bounds =
+        bounds(track.iter().map(|(ned, _)| ned.truncate()).chain(seen), flats.iter().map(around).chain(boxes.iter().map(from_above)));
     let terrain = sequence.scene.terrain.as_ref();
     let relief = terrain.map(|terrain| ui.ctx().load_texture("relief", relief(terrain, bounds), TextureOptions::LINEAR));
-    let chart = Chart { of, track: Arc::new(track), bounds, relief, flats: Arc::new(flats), boxes: Arc::new(boxes) };
+    let chart = Chart {
+        of,
+        track: Arc::new(track),
+        flown: Arc::new(flown),
+        log: Arc::new(rows(&loaded.log, [stamp_s(0), stamp_s(last)])),
+        bounds,
+        relief,
+        flats: Arc::new(flats),
+        boxes: Arc::new(boxes),
+    };
     ui.data_mut(|data| data.insert_temp(id, chart.clone()));
     chart
 }
@@ -97,24 +118,40 @@ fn seen(sequence: &Sequence, camera: &CameraModel) -> Vec<DVec2> {
         let pose = sequence.path.pose(sequence.start_s + (last * k / 4) as f64 / sequence.scenario.camera.fps);
         let here = pose.position_ned_m.truncate();
         let runs = footprint(&sequence.scene, camera, &pose);
-        runs.into_iter().flatten().map(move |ne| here + (ne - here).clamp_length_max(FARTHEST_M)).collect::<Vec<_>>()
+        runs.into_iter().flatten().map(move |ned| here + (ned.truncate() - here).clamp_length_max(FARTHEST_M)).collect::<Vec<_>>()
     };
     (0..=4).flat_map(of).collect()
 }
 
 /// Patterns and boards by their corners, all else by boxes.
-fn things(scene: &Scene) -> (Vec<[DVec2; 4]>, Vec<[DVec2; 2]>) {
-    let corner = |mesh: &camsim_core::scene::Mesh, vertex: u32| mesh.position_ned_m(vertex).truncate();
-    let flat = |mesh: &&camsim_core::scene::Mesh| is_flat(mesh) && mesh.shape.vertices.len() == 4;
-    let flats = scene.meshes.iter().filter(flat).map(|mesh| [0, 1, 3, 2].map(|vertex| corner(mesh, vertex))).collect();
-    let others: Vec<_> = scene.meshes.iter().filter(|mesh| !flat(mesh)).collect();
+fn things(scene: &Scene) -> (Vec<[DVec3; 4]>, Vec<[DVec3; 2]>) {
+    let flats = flats(scene).map(|mesh| [0, 1, 3, 2].map(|vertex| mesh.position_ned_m(vertex))).collect();
+    let others: Vec<_> = scene.meshes.iter().filter(|mesh| !is_quad(mesh)).collect();
     let every = others.len().div_ceil(MOST_BOXES).max(1);
     let boxes = others.iter().step_by(every).map(|mesh| mesh.bounds()).filter(|bounds| !bounds.is_empty());
-    (flats, boxes.map(|bounds| [bounds.min.truncate(), bounds.max.truncate()]).collect())
+    (flats, boxes.map(|bounds| [bounds.min, bounds.max]).collect())
 }
 
-fn around(corners: &[DVec2; 4]) -> [DVec2; 2] {
-    corners.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], corner| [low.min(*corner), high.max(*corner)])
+/// Patterns and boards, whose corners stand row after row.
+pub fn flats(scene: &Scene) -> impl Iterator<Item = &Mesh> {
+    scene.meshes.iter().filter(|mesh| is_quad(mesh))
+}
+
+fn is_quad(mesh: &Mesh) -> bool {
+    is_flat(mesh) && mesh.shape.vertices.len() == 4
+}
+
+/// Places of the log's rows from one instant to another, with those on either side of it.
+fn rows(log: &FlightLog, [from_s, to_s]: [f64; 2]) -> Vec<DVec3> {
+    let first = log.rows.partition_point(|row| row.t_s < from_s).saturating_sub(1);
+    let end = (log.rows.partition_point(|row| row.t_s <= to_s) + 1).min(log.rows.len());
+    let within = log.rows.get(first..end).unwrap_or_default();
+    within.iter().step_by(within.len().div_ceil(MOST_ROWS).max(1)).map(|row| row.position_ned_m).collect()
+}
+
+fn around(corners: &[DVec3; 4]) -> [DVec2; 2] {
+    let from_above = corners.map(DVec3::truncate);
+    from_above.iter().fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], corner| [low.min(*corner), high.max(*corner)])
 }
 
 /// A square around the track and what the camera sees, and around what stands near it; what it stands on may reach beyond.

@@ -16,11 +16,11 @@ const HALVINGS: u32 = 9;
 /// Surfaces of more triangles are no ground.
 const FLAT_TRIANGLES: usize = 2;
 
-/// North and east of the outermost ground that is seen in directions all around the picture, closed; `None` where there is none in a direction. Where
+/// The outermost ground that is seen in directions all around the picture, closed; `None` where there is none in a direction. Where
 /// a lens folds, the picture's corners have no rays, and beyond the horizon or beside the terrain rays meet nothing: then it is what is seen last.
-pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec2>> {
+pub fn footprint(scene: &Scene, camera: &CameraModel, pose: &CameraPose) -> Vec<Vec<DVec3>> {
     let meets = |uv: DVec2| ground(scene, pose, pose.ned_from_camera * uv.extend(1.0));
-    let mut runs: Vec<Vec<DVec2>> = vec![Vec::new()];
+    let mut runs: Vec<Vec<DVec3>> = vec![Vec::new()];
     for k in 0..=DIRECTIONS {
         let angle = std::f64::consts::TAU * f64::from(k % DIRECTIONS) / f64::from(DIRECTIONS);
         match (outermost(camera, DVec2::from_angle(angle), meets), runs.last_mut()) {
@@ -56,13 +56,13 @@ pub fn outermost<T>(camera: &CameraModel, direction: DVec2, of: impl Fn(DVec2) -
 }
 
 /// The nearest of terrain, pattern and board along a ray.
-fn ground(scene: &Scene, pose: &CameraPose, direction_ned: DVec3) -> Option<DVec2> {
+pub fn ground(scene: &Scene, pose: &CameraPose, direction_ned: DVec3) -> Option<DVec3> {
     let origin = pose.position_ned_m;
     let terrain = scene.terrain.as_ref().and_then(|terrain| terrain.intersect(origin, direction_ned, f64::INFINITY)).map(|hit| hit.t);
     let flat = scene.meshes.iter().filter(|mesh| is_flat(mesh));
     let nearest = flat.filter_map(|mesh| mesh.intersect(origin, direction_ned, f64::INFINITY)).map(|(t, _)| t);
     let t = nearest.chain(terrain).min_by(f64::total_cmp)?;
-    Some((origin + t * direction_ned).truncate())
+    Some(origin + t * direction_ned)
 }
 
 /// Patterns and boards are two triangles.
@@ -103,7 +103,7 @@ mod tests {
         assert_eq!(run.first(), run.last(), "closed");
         // 100 m below, a pixel is a metre: half of the picture is 100 x 50 m.
         for point in run {
-            let away = (*point - DVec2::new(10.0, 20.0)).abs() / DVec2::new(100.0, 50.0);
+            let away = (point.truncate() - DVec2::new(10.0, 20.0)).abs() / DVec2::new(100.0, 50.0);
             assert!((away.max_element() - 1.0).abs() < 1e-9, "{point} on the border of the picture");
         }
     }
@@ -127,7 +127,7 @@ mod tests {
         let runs = footprint(&scene, &camera(&[]), &pose);
         let [run] = runs.as_slice() else { panic!("one run: {runs:?}") };
         for point in run {
-            let away = (point.abs() / 30.0).max_element();
+            let away = (point.truncate().abs() / 30.0).max_element();
             assert!((away - 1.0).abs() < 0.01, "{point} on the border of the ground");
         }
     }

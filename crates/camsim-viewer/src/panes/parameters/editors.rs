@@ -4,10 +4,14 @@ mod names;
 
 use camsim_core::scenario::LightSpec;
 use camsim_io::scenario_file::Kind;
-use eframe::egui::{self, Response, Role, Ui};
+use eframe::egui::{self, Role, Ui};
 use toml::Value;
 
-use super::super::widgets::named;
+use super::super::{
+    numbers::{Field, number as number_field},
+    tips::Explained,
+    widgets::named,
+};
 use crate::{
     document::Document,
     message::{Message, Outbox},
@@ -54,28 +58,8 @@ fn as_f64(value: &Value) -> f64 {
 
 /// A value to drag or to type.
 fn drag(ui: &mut Ui, name: &str, label: &str, value: f64, param: &Param, whole: bool, out: &mut Outbox) -> Option<(f64, bool)> {
-    let mut changed = value;
-    let [low, high] = param.range;
-    let mut editor = egui::DragValue::new(&mut changed).speed(param.speed).range(low..=high).clamp_existing_to_range(false);
-    if !label.is_empty() {
-        editor = editor.prefix(format!("{label} "));
-    }
-    editor = if whole { editor.max_decimals(0) } else { editor.max_decimals(7) };
-    let response = ui.add(editor).on_hover_text(format!(
-        "{}{}",
-        param.tip,
-        if param.unit.is_empty() { String::new() } else { format!(" ({})", param.unit) }
-    ));
-    named(&response, Role::SpinButton, name);
-    end_of(&response, out);
-    (response.changed() && changed != value).then(|| (changed, response.dragged()))
-}
-
-/// A hand that lets go ends what counts as one step.
-fn end_of(response: &Response, out: &mut Outbox) {
-    if response.drag_stopped() {
-        out.push(Message::EndGesture);
-    }
+    let Param { unit, range, speed, tip, .. } = *param;
+    number_field(ui, &Field { name, label, unit, range, speed, decimals: 7, whole, tip }, value, out)
 }
 
 fn to_value(number: f64, whole: bool) -> Value {
@@ -84,7 +68,7 @@ fn to_value(number: f64, whole: bool) -> Value {
 
 fn number(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, whole: bool, out: &mut Outbox) -> Option<Edit> {
     let Some(value) = value else {
-        let add = ui.button("set").on_hover_text(param.tip);
+        let add = ui.button("set").explained(param.tip);
         named(&add, Role::Button, &format!("set {key}"));
         return add.clicked().then(|| to_value(first_value(param), whole)).and_then(once);
     };
@@ -113,7 +97,7 @@ fn first_value(param: &Param) -> f64 {
 
 fn remove(ui: &mut Ui, key: &str) -> bool {
     let name = format!("leave out {key}");
-    let button = ui.small_button("x").on_hover_text(&name);
+    let button = ui.small_button("x").explained(&name);
     named(&button, Role::Button, &name);
     button.clicked()
 }
@@ -122,7 +106,7 @@ fn number_or(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param, words
     let value = value?;
     for word in words {
         let is_word = value.as_str() == Some(word);
-        let response = ui.selectable_label(is_word, *word).on_hover_text(param.tip);
+        let response = ui.selectable_label(is_word, *word).explained(param.tip);
         named(&response, Role::Button, &format!("{key}: {word}"));
         if response.clicked() {
             return if is_word { once(to_value(first_value(param).max(1.0), whole)) } else { once(Value::String((*word).into())) };
@@ -171,7 +155,7 @@ fn optional(
         let edit = numbers(ui, document, key, value, param, count, false, out);
         return if may_be_left_out && remove(ui, key) { Some(Edit { value: None, ongoing: false }) } else { edit };
     }
-    let add = ui.button("set").on_hover_text(param.tip);
+    let add = ui.button("set").explained(param.tip);
     named(&add, Role::Button, &format!("set {key}"));
     let camera = &document.scenario.camera;
     let start = match key.rsplit('.').next() {
@@ -193,7 +177,7 @@ fn numbers_or(
     out: &mut Outbox,
 ) -> Option<Edit> {
     let is_word = value.is_some_and(Value::is_str);
-    let response = ui.selectable_label(is_word, word).on_hover_text(param.tip);
+    let response = ui.selectable_label(is_word, word).explained(param.tip);
     named(&response, Role::Button, &format!("{key}: {word}"));
     if response.clicked() {
         return once(if is_word { Value::Array(vec![Value::Float(0.0); count]) } else { Value::String(word.into()) });
@@ -205,7 +189,7 @@ fn numbers_or(
 fn list(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>, param: &Param, out: &mut Outbox) -> Option<Edit> {
     let array = value?.as_array()?;
     let mut edit = numbers(ui, document, key, value, param, array.len(), false, out);
-    let (more, less) = (ui.small_button("+").on_hover_text("one more"), ui.small_button("-").on_hover_text("one less"));
+    let (more, less) = (ui.small_button("+").explained("one more"), ui.small_button("-").explained("one less"));
     named(&more, Role::Button, &format!("one more of {key}"));
     named(&less, Role::Button, &format!("one less of {key}"));
     let mut changed = array.clone();
@@ -225,7 +209,7 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
     let (beside, elsewhere) = (document.beside(present), shortened(present));
     let resting = if beside.len() < present.len() { beside.clone() } else { elsewhere };
     let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or(resting);
-    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).on_hover_text(present);
+    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).explained(present);
     named(&response, Role::TextInput, key);
     if response.gained_focus() {
         ui.data_mut(|data| data.insert_temp(id, beside));

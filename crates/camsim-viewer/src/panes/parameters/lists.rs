@@ -4,23 +4,24 @@ use camsim_io::scenario_file::keys;
 use eframe::egui::{Role, Ui};
 use toml::{Table, Value};
 
-use super::super::widgets::named;
+use super::super::{tips::Explained, widgets::named};
 use super::row_at;
 use crate::{
     document::Document,
     message::{Message, Outbox},
     params,
+    state::State,
 };
 
 /// A list with its entries, one below the other.
-pub fn show(ui: &mut Ui, document: &Document, key: &str, out: &mut Outbox) {
+pub fn show(ui: &mut Ui, state: &State, document: &Document, key: &str, out: &mut Outbox) {
     let entries = document.value(key).and_then(Value::as_array).map_or(0, Vec::len);
     let leaf = key.rsplit('.').next().unwrap_or(key);
     for at in 0..entries {
         ui.horizontal(|ui| {
             ui.label(format!("{leaf} {}", at + 1));
             let name = format!("remove {key} {}", at + 1);
-            let remove = ui.small_button("x").on_hover_text(&name);
+            let remove = ui.small_button("x").explained(&name);
             named(&remove, Role::Button, &name);
             if remove.clicked() {
                 out.push(Message::Set(format!("{key}.{at}"), None, false));
@@ -30,13 +31,13 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, out: &mut Outbox) {
             for (element, kind) in keys() {
                 let Some(field) = element.strip_prefix(key).and_then(|rest| rest.strip_prefix('.')) else { continue };
                 if let Some(param) = params::of(element) {
-                    row_at(ui, document, &format!("{key}.{at}.{field}"), *kind, param, out);
+                    row_at(ui, state, document, &format!("{key}.{at}.{field}"), *kind, param, out);
                 }
             }
         });
     }
     let tip = params::of(key).map_or("", |param| param.tip);
-    let add = ui.button(format!("add {leaf}")).on_hover_text(tip);
+    let add = ui.button(format!("add {leaf}")).explained(tip);
     if add.clicked() {
         let mut list = document.value(key).and_then(Value::as_array).cloned().unwrap_or_default();
         list.push(Value::Table(fresh(document, key)));

@@ -3,7 +3,7 @@
 use camsim_core::scenario::{CameraSpec, LensModel, LensSpec, ShutterSpec};
 use eframe::egui::{self, Role, Ui};
 
-use super::super::widgets::named;
+use super::super::{tips::Explained, widgets::named};
 use crate::message::{Message, Outbox};
 
 /// A calibration as its source publishes it.
@@ -83,7 +83,7 @@ impl Preset {
 pub fn show(ui: &mut Ui, out: &mut Outbox) {
     let combo = egui::ComboBox::from_id_salt("camera preset").selected_text("camera preset").show_ui(ui, |ui| {
         for preset in PRESETS {
-            if ui.selectable_label(false, preset.name).on_hover_text(preset.source).clicked() {
+            if ui.selectable_label(false, preset.name).explained(preset.source).clicked() {
                 out.push(Message::Camera(Box::new(preset.camera())));
             }
         }
@@ -91,7 +91,7 @@ pub fn show(ui: &mut Ui, out: &mut Outbox) {
     named(&combo.response, Role::ComboBox, "camera preset");
     combo
         .response
-        .on_hover_text("a calibration file (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be dropped on the window too");
+        .explained("a calibration file (OpenCV, Kalibr, EuRoC, ROS, Agisoft, Gyroflow, CAMERA.toml) can be dropped on the window too");
 }
 
 #[cfg(test)]
