@@ -105,7 +105,7 @@ fn a_town_from_between_its_houses() {
         let done = render(&engine(), &sequence, &[Channel::Depth, Channel::Coords], frame);
         let errors = errors(&sequence, &done);
         eprintln!("frame {frame}: {errors:?}");
-        // What is left are cracks of the models and slivers, which a ray beside the pixel's centre misses.
-        assert!(errors.kept() && errors.depth_beyond <= 4 && errors.pixels == 120_000, "frame {frame}: {errors:?}");
+        // What is left, fewer than one pixel in 20 000, are cracks of the models and slivers, which a ray beside the pixel's centre misses.
+        assert!(errors.kept() && errors.depth_beyond * 20_000 < errors.pixels && errors.pixels == 120_000, "frame {frame}: {errors:?}");
     }
 }
