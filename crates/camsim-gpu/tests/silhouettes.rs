@@ -340,11 +340,19 @@ fn a_picture_may_have_a_single_pixel() {
     let cases = [(Auto::Auto, (still, still)), (Auto::Auto, (still, TURN)), (Auto::Auto, moving)].into_iter().chain(forced);
     for size_px in [[1, 1], [1, 2], [2, 1], [3, 1]] {
         let mut listed = 0;
-        for ((solver, (velocity, rate)), exposure_ms) in cases.clone().flat_map(|case| [(case, 0.0), (case, 10.0)]) {
-            let sequence = sequence(tiny(size_px, exposure_ms, solver), steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
+        let ways = [Silhouettes::Auto, Silhouettes::Rays];
+        let cases = cases.clone().flat_map(|case| [(case, 0.0), (case, 10.0)]).flat_map(|case| ways.map(|way| (case, way)));
+        for (((solver, (velocity, rate)), exposure_ms), way) in cases {
+            let mut scenario = tiny(size_px, exposure_ms, solver);
+            scenario.quality.silhouettes = way;
+            let sequence = sequence(scenario, steady(120.0, 0.0, velocity, rate), black_ground_and_roof());
             let done = render(&engine, &sequence, &[Channel::Color, Channel::Depth], 0);
             let alpha: Vec<f32> = done.frame.color_rgba.chunks_exact(4).map(|pixel| pixel[3]).collect();
-            assert_eq!(alpha, vec![1.0; (size_px[0] * size_px[1]) as usize], "{size_px:?} {exposure_ms} ms {solver:?} {velocity} {rate}");
+            assert_eq!(
+                alpha,
+                vec![1.0; (size_px[0] * size_px[1]) as usize],
+                "{size_px:?} {exposure_ms} ms {solver:?} {way:?} {velocity} {rate}"
+            );
             listed += u32::from(done.plan.edges != EdgeStage::None);
         }
         assert!(listed > 0, "{size_px:?}: no plan lists pixels");

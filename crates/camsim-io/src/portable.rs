@@ -117,6 +117,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
     use crate::{camera_file::read_camera_toml, scenario_file::read_camera};
+    use camsim_core::scenario::ZoomSpec;
 
     #[test]
     fn paths_lead_from_the_folder_that_holds_them() {
@@ -164,7 +165,9 @@ mod tests {
         std::fs::write(at("v.png"), "a picture").unwrap();
         std::fs::create_dir_all(at("out/scene")).unwrap();
         std::fs::write(at("out/scene/zoom.csv"), "t_s,zoom\n").unwrap();
-        let mut camera = CameraSpec { zoom_track: Some(at("out/scene/zoom.csv")), ..CameraSpec::default() };
+        let zoom =
+            [1.0, 2.0].map(|at| ZoomSpec { at, focal_px: [500.0 * at; 2], principal_point_px: None, coefficients: Vec::new() }).to_vec();
+        let mut camera = CameraSpec { zoom, zoom_track: Some(at("out/scene/zoom.csv")), ..CameraSpec::default() };
         camera.photometric.vignette = Some(at("v.png"));
         write_camera(&at("out"), &camera).unwrap();
         std::fs::remove_file(at("v.png")).unwrap();

@@ -60,6 +60,7 @@ pub const PARAMS: &[Param] = &[
     param("tracker.max_acceleration_m_s2", "m/s2", POSITIVE, 0.1, "limit of the acceleration (the paper's a_max)"),
     param("tracker.max_angular_rate_deg_s", "deg/s", POSITIVE, 0.1, "limit of the body rate"),
     param("tracker.max_angular_acceleration_deg_s2", "deg/s2", POSITIVE, 0.5, "limit of the angular acceleration"),
+    param("camera.name", "", ANY, 1.0, "part of the seed of the noise: cameras of other names have other noise"),
     param("camera.size_px", "px", [1.0, 8192.0], 1.0, "width and height of the picture (W, H)"),
     param("camera.focal_px", "px", [1.0, 20_000.0], 0.5, "focal lengths f_x, f_y"),
     param(
@@ -179,6 +180,8 @@ pub const PARAMS: &[Param] = &[
     param("quality.silhouettes", "", ANY, 1.0, "rays of their own for pixels at borders of surfaces"),
     param("output.channels", "", ANY, 1.0, "what is written for each frame"),
     param("output.format", "", ANY, 1.0, "file formats of colour"),
+    param("output.stamps", "", ANY, 1.0, "clock of stamps: the log's, or one that shows output.epoch_ns at the beginning of the window"),
+    param("output.epoch_ns", "ns", ANY, 1.0, "what that clock shows at the beginning of the window"),
     param("output.exr_pixel", "", ANY, 1.0, "pixel type of EXR colour"),
     param("output.exr_compression", "", ANY, 1.0, "compression of EXR"),
 ];

@@ -40,8 +40,9 @@ pub fn show(ui: &mut Ui, document: &Document, key: &str, kind: Kind, param: &Par
         Kind::Flag => flag(ui, key, value),
         Kind::Word(words) => word(ui, key, value, words),
         Kind::Words(words) => several(ui, key, value, words),
-        // Texts are of FRAME.toml alone.
-        Kind::Tables | Kind::Later | Kind::Text | Kind::Texts => None,
+        Kind::Text => text(ui, key, value, param),
+        // Lists of texts are of FRAME.toml alone.
+        Kind::Tables | Kind::Later | Kind::Texts => None,
     };
     if let Some(Edit { value, ongoing }) = edit {
         out.push(Message::Set(key.to_owned(), value, ongoing));
@@ -225,6 +226,24 @@ fn path(ui: &mut Ui, document: &Document, key: &str, value: Option<&Value>) -> O
         return None;
     }
     Some(Edit { value: (!text.is_empty()).then(|| Value::String(document.resolved(&text))), ongoing: false })
+}
+
+/// A text that counts when its field is left; an empty one is left out.
+fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<Edit> {
+    let present = value.and_then(Value::as_str).unwrap_or_default();
+    let id = egui::Id::unique(("text", key));
+    let mut text = ui.data(|data| data.get_temp::<String>(id)).unwrap_or_else(|| present.to_owned());
+    let response = ui.add(egui::TextEdit::singleline(&mut text).desired_width(170.0).hint_text("none")).explained(param.tip);
+    named(&response, Role::TextInput, key);
+    if response.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, text));
+        return None;
+    }
+    ui.data_mut(|data| data.remove_temp::<String>(id))?;
+    if !response.lost_focus() || text == present {
+        return None;
+    }
+    Some(Edit { value: (!text.is_empty()).then(|| Value::String(text)), ongoing: false })
 }
 
 /// The end of a path: it tells more than its beginning.
