@@ -243,7 +243,7 @@ fn text(ui: &mut Ui, key: &str, value: Option<&Value>, param: &Param) -> Option<
     if !response.lost_focus() || text == present {
         return None;
     }
-    Some(Edit { value: (!text.is_empty()).then(|| Value::String(text)), ongoing: false })
+    Some(Edit { value: (!text.is_empty()).then_some(Value::String(text)), ongoing: false })
 }
 
 /// The end of a path: it tells more than its beginning.
