@@ -111,7 +111,7 @@ mod tests {
         assert!(suspects(1, |_, _| true, |x, y| 0.01 + 0.002 * x + 0.003 * y).is_empty());
         assert!(suspects(1, |_, _| true, |_, _| 0.0).is_empty());
         // A step between the fields of an interlaced frame is none: they are of other instants.
-        assert!(suspects(2, |_, _| true, |_, y| if y as u32 % 2 == 0 { 0.01 } else { 0.02 }).is_empty());
+        assert!(suspects(2, |_, _| true, |_, y| if (y as u32).is_multiple_of(2) { 0.01 } else { 0.02 }).is_empty());
     }
 
     #[test]
