@@ -31,6 +31,9 @@ fn camera(pitch_deg: f64) -> Scenario {
     scenario
 }
 
+/// Name, pitch of the camera in degrees, what it looks at, and what else is different.
+type Case = (&'static str, f64, Scene, fn(&mut Scenario));
+
 /// Steep hills with a roof over them.
 fn hills() -> Scene {
     let heights: Vec<f64> = (0..129 * 129).map(|i| 30.0 * (f64::from(i % 129) * 0.4).sin() * (f64::from(i / 129) * 0.3).cos()).collect();
@@ -48,7 +51,7 @@ fn errors(sequence: &Arc<Sequence>, done: &Finished) -> TruthErrors {
 #[cfg_attr(skip_gpu, ignore = "CAMSIM_SKIP_GPU is set")]
 fn every_depth_belongs_to_a_surface_that_the_pixel_sees() {
     let engine = engine();
-    let cases: [(&str, f64, Scene, fn(&mut Scenario)); 6] = [
+    let cases: [Case; 6] = [
         ("roof", -90.0, black_ground_and_roof(), |_| {}),
         ("roof, rays at silhouettes", -90.0, black_ground_and_roof(), |s| s.quality.silhouettes = Silhouettes::Rays),
         ("hills from above", -90.0, hills(), |_| {}),
