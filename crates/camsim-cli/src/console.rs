@@ -45,6 +45,12 @@ impl<'a> Console<'a> {
         self.scenario = Some((scenario.into(), changes));
     }
 
+    /// The command that was typed.
+    #[must_use]
+    pub fn command(&self) -> String {
+        self.typed.iter().map(|word| quoted(word.as_os_str())).collect::<Vec<_>>().join(" ")
+    }
+
     /// The command that was typed, with one more option.
     #[must_use]
     pub fn command_with(&self, option: &str) -> String {

@@ -43,7 +43,7 @@ Exit codes:
   1  it failed on the way (disk, device, a check that did not hold)
   2  wrong usage or bad input: the message says where, and what to do
   3  no usable graphics adapter
-  130  stopped by Ctrl-C: what is written is whole, and the message says how to go on
+  130  stopped by Ctrl-C: what is written is whole, and the message says how to go on; a second Ctrl-C ends at once, without it
 
 CAMSIM_ADAPTER=part-of-a-name picks the adapter (names: `camsim info`). CAMSIM_REVERSE=device or host says where output frames are made from
 ideal frames, CAMSIM_IDEAL=device or host where those are drawn (`camsim info --help`).";

@@ -37,6 +37,16 @@ pub enum ScenarioError {
         /// First bad byte.
         offset: usize,
     },
+    /// A camera file that a scenario names cannot be read.
+    #[error("camera: cannot read {}: {source}; the key `camera` of {} names it, relative to that file's folder", path.display(), scenario.display())]
+    ReadCamera {
+        /// The camera file.
+        path: PathBuf,
+        /// The scenario.
+        scenario: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
     /// Not TOML.
     #[error("{}:{line}: not valid TOML: {message}", path.display())]
     Syntax {

@@ -14,7 +14,7 @@ use crate::{
     failure::{Failure, OrFail},
     frame_source::Device,
     inputs::{self, ScenarioArgs},
-    render_run::{self, Job, go_on},
+    render_run::{self, Job},
 };
 
 /// Every n-th frame of the built-in flight is rendered: the turn shows in a few seconds of work.
@@ -45,7 +45,7 @@ pub fn run(args: &Args, console: &mut Console<'_>) -> Result<(), Failure> {
     let scenario = ScenarioArgs { scenario: scene.clone(), changes: inputs::Changes::default() }.read(console)?;
     let loaded = inputs::load(&scenario, console)?;
     let frames: Vec<u64> = (0..loaded.sequence.frames).step_by(FRAME_STEP).collect();
-    let go_on = go_on(folder);
+    let go_on = console.command();
     let warnings = &loaded.warnings;
     let job = Job { sequence: &loaded.sequence, folder, frames: &frames, shard: None, resume: false, warnings, go_on: &go_on };
     let mut thumbnails = Vec::new();

@@ -60,7 +60,7 @@ pub struct Args {
     /// File formats instead of output.format; none renders and reads back but writes no frame (for timing)
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     format: Option<Vec<Format>>,
-    /// Keep frames that are there already; refused if the folder is of another scenario, or a file that it names has changed
+    /// Keep frames whose files are there already (files are written whole, so what is in them is not read again); refused if the folder is of another scenario, or a file that it names has changed
     #[arg(long)]
     resume: bool,
     /// Say at the end where the time went: on the host, and pass by pass on the device

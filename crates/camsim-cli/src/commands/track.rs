@@ -27,7 +27,7 @@ const MOST_ROWS: f64 = 10e6;
 ///
 /// Columns: t_s,n_m,e_m,d_m (local NED, metres), vn,ve,vd, an,ae,ad, qw,qx,qy,qz (ned_from_body), wx,wy,wz (body rates, rad/s),
 /// alphax,alphay,alphaz (rad/s^2); with --of camera t_s,n_m,e_m,d_m, vn,ve,vd, qw,qx,qy,qz (ned_from_camera), wx,wy,wz (in optical axes): the optical
-/// centre with lever arm, mount and vibration. Rows are those of flight.window_s, its first and last instant among them; all of the log without one.
+/// centre with lever arm, mount and vibration. Rows begin with the first instant of flight.window_s and follow at the rate up to its end; without a window they are of all of the log.
 /// t_s is as in the log, or as output.stamps says. The report is of the whole log.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\

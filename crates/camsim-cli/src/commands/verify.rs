@@ -418,7 +418,7 @@ fn print(verified: &Verified, tolerance_dn: f64, console: &mut Console<'_>) -> R
 
 fn describe_truth(truth: &Truth) -> String {
     let Truth { kept, pixels, depth_beyond, depth_faults, depth_max, points_beyond, point_faults, point_max } = truth;
-    let largest = |error: &Option<f64>| error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.2e} %", 100.0 * error));
+    let largest = |error: &Option<f64>| error.map_or_else(|| "sky for a surface".to_owned(), |error| format!("{:.3} %", 100.0 * error));
     let percent = 100.0 * DEPTH_TOLERANCE;
     format!(
         "off by more than {percent} % of the depth, of {pixels} pixels: {depth_beyond} depths (largest error {}), {points_beyond} points (largest {}); of no surface near the pixel: {depth_faults} and {point_faults}: {}",

@@ -1,6 +1,6 @@
 //! The scene of a scenario, in the local frame of its log.
 
-use std::{cell::RefCell, sync::Arc};
+use std::{cell::RefCell, collections::HashSet, sync::Arc};
 
 use camsim_core::{
     flight_log::{FlightLog, HeightConversion},
@@ -64,6 +64,9 @@ pub(super) fn load_scene(scenario: &Scenario, log: &FlightLog) -> Result<(Scene,
     notes.extend((left > 0).then(|| {
         format!("scene.gltf: {left} places where blended triangles pass through each other are not cut, and may be mixed in the wrong order there")
     }));
+    // Models of one file say the same.
+    let mut said = HashSet::new();
+    notes.retain(|note| said.insert(note.clone()));
     Ok((scene, summary, notes))
 }
 

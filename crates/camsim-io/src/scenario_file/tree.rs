@@ -127,7 +127,10 @@ impl Tree {
     pub(super) fn resolve_camera(&mut self) -> Result<(), ScenarioError> {
         let Some(Value::String(name)) = self.root.get("camera") else { return Ok(()) };
         let path = self.resolve("camera", name);
-        let camera = Self::read_camera(&path)?;
+        let camera = Self::read_camera(&path).map_err(|error| match error {
+            ScenarioError::Read { path, source } => ScenarioError::ReadCamera { path, scenario: self.file.clone(), source },
+            other => other,
+        })?;
         self.root.insert("camera".into(), Value::Table(camera.root));
         self.places.insert("camera".into(), Place::File(path, 1));
         self.places.extend(camera.places);
