@@ -289,7 +289,13 @@ fn with_nearest_key(message: &str) -> String {
     if !message.starts_with("unknown") {
         return message.to_owned();
     }
-    let nearest = words.next().and_then(|unknown| words.min_by_key(|known| strsim::damerau_levenshtein(unknown, known)));
+    let nearest = words.next().and_then(|unknown| {
+        // Times of rows are all told by the readout, however they are spelt.
+        let is_readout = ["line_delay", "readout", "rolling"].iter().any(|part| unknown.contains(part));
+        let known: Vec<&str> = words.collect();
+        let readout = known.iter().copied().find(|known| is_readout && *known == "readout_ms");
+        readout.or_else(|| known.into_iter().min_by_key(|known| strsim::damerau_levenshtein(unknown, known)))
+    });
     nearest.map_or_else(|| message.to_owned(), |nearest| format!("{message}; did you mean `{nearest}`?"))
 }
 

@@ -285,6 +285,10 @@ pub(super) fn left_out(keys: &'static [Key], leaves: &[Leaf<'_>], done: &[String
     notes
 }
 
+/// Names whose words change what the numbers beside them mean.
+const MEANING_WORDS: &[&str] =
+    &["orientation", "pixel_origin", "origin", "convention", "color_encoding", "coordinate_system", "axes", "rotation"];
+
 /// Anything that may be a number of the camera; of words, those that may be a model.
 fn is_telling(leaf: &Leaf<'_>) -> bool {
     let name = leaf.name().to_ascii_lowercase();
@@ -292,9 +296,10 @@ fn is_telling(leaf: &Leaf<'_>) -> bool {
         Value::Bool(yes) => *yes,
         Value::String(text) if flat(leaf.value).is_none() => {
             !text.trim().is_empty()
-                && ["model", "distort", "project", "lens", "shutter", "crop", "type", "mask", "vignet", "unit"]
+                && (["model", "distort", "project", "lens", "shutter", "crop", "type", "mask", "vignet", "unit"]
                     .iter()
                     .any(|part| name.contains(part))
+                    || MEANING_WORDS.contains(&name.as_str()))
         }
         other => flat(other).is_some(),
     }

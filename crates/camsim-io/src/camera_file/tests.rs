@@ -48,6 +48,8 @@ fn a_camera_toml_has_the_keys_of_camera_at_its_root() {
     assert!(error.contains("camera.toml:2") && error.contains("did you mean `focal_px`"), "{error}");
     let error = toml("[shutter]\nread_out = \"top-to-bottom\"\n").unwrap_err().to_string();
     assert!(error.contains("did you mean `readout`"), "{error}");
+    let error = toml("[shutter]\nline_delay_us = 30\n").unwrap_err().to_string();
+    assert!(error.contains("did you mean `readout_ms`"), "{error}");
     assert!(toml("focal_px = [0.0, 1.0]").unwrap_err().to_string().contains("focal_px"));
     assert!(toml("[lens]\nmodel = \"fisheye\"").unwrap_err().to_string().contains("kannala-brandt"));
     let missing = read_camera_toml(Path::new("/no/such/camera.toml")).unwrap_err();

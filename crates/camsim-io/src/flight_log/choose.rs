@@ -110,6 +110,16 @@ pub(super) fn attitude_columns(header: &Header, notes: &mut Vec<Note>) -> Result
                 format!("an attitude needs roll, pitch and yaw, or qx, qy, qz and qw: {} alone is none", header.list(&some)),
             );
         }
+        let numbered = named(header, |name| ["q0", "q1", "q2", "q3", "q4", "q[0]", "q[1]", "q[2]", "q[3]"].contains(&name));
+        if !numbered.is_empty() {
+            warning(
+                notes,
+                format!(
+                    "{} are no attitude, as their order is not known: rename them to qw, qx, qy, qz (PX4 numbers them in this order)",
+                    header.list(&numbered)
+                ),
+            );
+        }
         return Ok(AttitudeColumns::None);
     }
     let &[yaw] = &yaws[..] else { return Err(header.two(&yaws)) };
@@ -138,6 +148,21 @@ pub(super) fn position_columns(
         let letters = header.all(|meaning| meaning == Meaning::Hemisphere);
         if !letters.is_empty() {
             return Err(format!("{} say the hemisphere by letters: write signed degrees and remove these columns", header.list(&letters)));
+        }
+        let is_part = |name: &str| {
+            let part = name
+                .strip_prefix("latitude_")
+                .or(name.strip_prefix("longitude_"))
+                .or(name.strip_prefix("lat_"))
+                .or(name.strip_prefix("lon_"));
+            part.is_some_and(|part| ["min", "mins", "minute", "minutes", "sec", "secs", "second", "seconds"].contains(&part))
+        };
+        let parts = named(header, is_part);
+        if !parts.is_empty() {
+            return Err(format!(
+                "{} are minutes and seconds of latitude and longitude: write degrees with decimals in one column each, and remove these columns",
+                header.list(&parts)
+            ));
         }
         let height = height_column(header, Some(spec.height), notes)?;
         let plane = match (header.all_of([Latitude, Longitude])?, header.one(LatitudeLongitude)?) {
@@ -199,6 +224,11 @@ pub(super) fn position_columns(
         ));
     }
     Err(if format == LogFormat::Auto { what_is_missing(header) } else { named_otherwise() })
+}
+
+/// Columns by their names in lower case.
+fn named(header: &Header, is: impl Fn(&str) -> bool) -> Vec<usize> {
+    (0..header.0.len()).filter(|&column| is(&header.name(column).trim_matches(['"', ' ']).to_lowercase())).collect()
 }
 
 /// EuRoC's names, TUM's names, or TUM's order of plain names between blanks: worlds of which it is known that z points up.
@@ -296,6 +326,24 @@ fn height_column(header: &Header, reference: Option<HeightReference>, notes: &mu
 
 pub(super) fn say_what_is_not_used(header: &Header, frame: Frame, attitude: AttitudeColumns, notes: &mut Vec<Note>) {
     use Meaning::{Course, Gimbal};
+    let says_how = |name: &str| {
+        let stem = ["_unit", "_units", "_datum", "_frame"].iter().find_map(|end| name.strip_suffix(end));
+        stem.is_some_and(|stem| names::find(stem).is_some())
+    };
+    let how = named(header, says_how);
+    if !how.is_empty() {
+        warning(
+            notes,
+            format!(
+                "{} are not read: name units in the header (alt_ft), and say by flight.height what heights are above",
+                header.list(&how)
+            ),
+        );
+    }
+    let declination = named(header, |name| name.starts_with("declination") || name.starts_with("magnetic_declination"));
+    if !declination.is_empty() && matches!(attitude, AttitudeColumns::Euler(_)) {
+        warning(notes, format!("{} is not applied: yaw is taken as from true north", header.list(&declination)));
+    }
     let gimbal = header.all(|meaning| meaning == Gimbal);
     if !gimbal.is_empty() {
         warning(notes, format!("{} are not used: camera.mount says where the camera looks", header.list(&gimbal)));

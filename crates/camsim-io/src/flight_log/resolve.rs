@@ -318,6 +318,18 @@ fn guess_angles(
     let within = |axis: usize| column(axis).all(|value| (domain[axis].start() - SLACK..=domain[axis].end() + SLACK).contains(&value));
     let all_zero = open.iter().all(|&axis| column(axis).all(|value| value == 0.0));
     if all_zero || !open.iter().all(|&axis| within(axis)) {
+        let most = |axis: usize| column(axis).fold(0.0, |most: f64, value| most.max(value.abs()));
+        let (low, high) = column(2).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), yaw| (yaw.min(low), yaw.max(high)));
+        let tilt = most(0).max(most(1));
+        if open.len() == 3 && tilt > 0.0 && tilt <= 1.6 && high - low > 6.3 {
+            notes.push(Note {
+                is_warning: true,
+                text: format!(
+                    "roll and pitch are read as degrees like yaw, but never exceed {}: if they are radians, set flight.angle_unit or name the units in the header (roll_rad, yaw_deg)",
+                    short(tilt)
+                ),
+            });
+        }
         return Ok(1.0);
     }
     let wraps = |a: f64, b: f64| (b - a).abs() > 5.2 && ((a.abs() > 2.6 && b.abs() > 2.6 && a * b < 0.0) || (a - b).abs() > 5.5);

@@ -58,3 +58,13 @@ fn coefficients_by_name() {
         assert_eq!(is_coefficient(name), is, "{name}");
     }
 }
+
+#[test]
+fn words_that_change_a_meaning_are_named() {
+    let value = json!({"orientation": "upside_down", "pixel_origin": "corner", "color_encoding": "linear", "serial": "a1"});
+    let notes = left_out(&[], &leaves(&value), &[]).join(" ");
+    for word in ["orientation = `upside_down`", "pixel_origin = `corner`", "color_encoding = `linear`"] {
+        assert!(notes.contains(word), "{notes}");
+    }
+    assert!(!notes.contains("serial"), "{notes}");
+}

@@ -161,6 +161,23 @@ fn units_of_time() {
 }
 
 #[test]
+fn columns_beside_a_quantity_are_not_passed_over() {
+    let _all = AllFaults;
+    let minutes = log("t,lat_deg,lat_min,lat_sec,lon_deg,lon_min,alt", "T,47,30,0,8,15,H");
+    assert_refused("minutes", minutes.as_bytes(), &track(), &["`lat_min`", "`lat_sec`", "`lon_min`", "decimals"]);
+    for (name, value) in [("alt_units", "ft"), ("alt_datum", "MSL")] {
+        assert_flies(name, &log(&format!("t,lat,lon,alt,{name}"), &format!("T,LAT,LON,H,{value}")), &track(), name);
+    }
+    let attitude = log("t,lat,lon,alt,roll,pitch,yaw,magnetic_declination", "T,LAT,LON,H,2,-3,30,10");
+    assert_flies("declination", &attitude, &auto(), "`magnetic_declination`");
+    assert_flies("small tilts", &log("t,lat,lon,alt,roll,pitch,yaw", "T,LAT,LON,H,0.2,-0.15,3T"), &auto(), "flight.angle_unit");
+    for name in ["q0,q1,q2,q3", "q[0],q[1],q[2],q[3]"] {
+        let numbered = log(&format!("t,lat,lon,alt,{name}"), "T,LAT,LON,H,1,0,0,0");
+        assert_refused(name, numbered.as_bytes(), &auto(), &["no usable attitude", "qw, qx, qy, qz"]);
+    }
+}
+
+#[test]
 fn angles_and_quaternions() {
     let _all = AllFaults;
     let header = "t,lat,lon,alt,roll,pitch,yaw";
