@@ -64,6 +64,7 @@ mod images;
 pub mod list;
 mod npy;
 mod packed;
+mod png_chunks;
 mod poses;
 mod schema;
 mod set;

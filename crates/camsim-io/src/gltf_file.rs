@@ -161,7 +161,10 @@ fn read(path: &Path, options: GltfOptions) -> Result<Model, GltfError> {
     }
     let Reader { parts, mut notes, materials, reach_m, pose: Pose { note: pose_notes, .. }, .. } = reader;
     if parts.is_empty() {
-        notes.push("has no triangles: nothing of it is shown".into());
+        notes.push(match &source.hidden_nodes()[..] {
+            [] => "has no triangles: nothing of it is shown".into(),
+            hidden => format!("has no triangles that are visible: KHR_node_visibility hides {}, and nothing is shown", hidden.join(", ")),
+        });
     }
     if options.time_s.is_some() && document.animations().next().is_none() {
         notes.push("has no animation for time_s to be a time of: its nodes are as they stand".into());

@@ -82,17 +82,22 @@ pub(crate) struct Stored {
 /// Reads it.
 pub(crate) fn read_stored(path: &Path, encoding: Encoding) -> Result<Stored, PictureError> {
     let (picture, orientation) = decode(path)?;
-    let largest_of_16_bits = match &picture {
+    let largest_of_16_bits = largest_of_16_bits(&picture);
+    let picture = picture.into_rgba8();
+    let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
+    let texture = Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
+    Ok(Stored { texture, orientation: number, largest_of_16_bits })
+}
+
+/// The largest value but alpha of a picture of 16 bits.
+pub(crate) fn largest_of_16_bits(picture: &DynamicImage) -> Option<u16> {
+    match picture {
         DynamicImage::ImageLuma16(picture) => picture.iter().max().copied(),
         DynamicImage::ImageLumaA16(picture) => picture.pixels().map(|pixel| pixel.0[0]).max(),
         DynamicImage::ImageRgb16(picture) => picture.iter().max().copied(),
         DynamicImage::ImageRgba16(picture) => picture.pixels().flat_map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2]]).max(),
         _ => None,
-    };
-    let picture = picture.into_rgba8();
-    let number = (orientation != Orientation::NoTransforms).then(|| orientation.to_exif().into());
-    let texture = Texture { size_px: [picture.width(), picture.height()], rgba8: picture.into_raw(), encoding };
-    Ok(Stored { texture, orientation: number, largest_of_16_bits })
+    }
 }
 
 /// A picture turned as its orientation (1 to 8, EXIF) says.

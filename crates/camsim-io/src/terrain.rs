@@ -31,8 +31,10 @@ use camsim_core::{
 use glam::DVec3;
 
 use crate::pictures::PictureError;
-pub(crate) use beside::files as files_beside_raster;
+pub(crate) use beside::{files as files_beside_raster, read_mask as read_mask_beside, read_tags as read_tags_beside};
 pub use docs::documentation;
+
+pub(crate) use systems::unit_of_name;
 
 use dem::{Dem, EMPTY_RANGE, Heights, widened};
 use ortho::Ortho;

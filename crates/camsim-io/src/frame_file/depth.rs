@@ -4,7 +4,7 @@ use std::path::Path;
 
 use camsim_core::temporal::IdealGeometry;
 use glam::DVec2;
-use image::DynamicImage;
+use image::{DynamicImage, ImageFormat};
 
 use super::{
     DepthEncoding, DepthKind, FrameFileError, FrameSpec,
@@ -13,6 +13,7 @@ use super::{
     images::{failure, is_exr, open},
     npy,
     packed::{self, Packing},
+    png_chunks::PngChunks,
 };
 
 /// Stored values of one metre that 16 bits make sense of: steps from a kilometre to a micrometre.
@@ -80,7 +81,7 @@ fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, fram
     if let (false, Some(key)) = (exr, spec.depth_key()) {
         return Err(fail(key, "is for EXR, and depth is none; leave it out"));
     }
-    let floats = if exr { Some(read_exr_depth(path, spec, color_origin_px)?) } else { floats::read(path, spec.depth_rows, frame_path)? };
+    let floats = if exr { Some(read_exr_depth(path, spec, color_origin_px)?) } else { floats::read(path, spec, frame_path)? };
     let found = match floats {
         None if !exr => read_npy(path)?,
         floats => floats,
@@ -91,12 +92,14 @@ fn stored(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2]>, fram
         return Err(fail("depth_encoding", &message));
     }
     let (picture, format) = open(path)?;
+    let note = if format == ImageFormat::Png && packing.is_none() { PngChunks::read(path).depth_note() } else { None };
     let size_px = [picture.width(), picture.height()];
     let (values, unit) = match packing {
         Some(packing) => (packed::metres(&picture, format, packing, path)?, Unit::Packed),
         None => (whole_numbers(&picture, path)?, Unit::Whole),
     };
-    Ok(Stored { size_px, values, unit, notes: Vec::new() })
+    let notes = note.map(|note| format!("{}: {note}", path.display())).into_iter().collect();
+    Ok(Stored { size_px, values, unit, notes })
 }
 
 fn read_npy(path: &Path) -> Result<Option<Stored>, FrameFileError> {
@@ -134,6 +137,8 @@ fn read_exr_depth(path: &Path, spec: &FrameSpec, color_origin_px: Option<[i32; 2
 fn per_metre(spec: &FrameSpec, stored: &Stored, frame_path: &Path) -> Result<f64, FrameFileError> {
     let (given, inverse) = (spec.depth_per_metre, spec.depth_kind == DepthKind::Inverse);
     let message = match (given, stored.unit) {
+        // Where depth_per_metre is given as well, they agree.
+        (_, Unit::Stated) => return Ok(1.0),
         (Some(_), Unit::Packed) => "is for numbers; bytes of depth_encoding have their own formula in metres: leave it out".to_owned(),
         (Some(per_metre), _) if PER_METRE.contains(&per_metre) => return Ok(per_metre),
         (Some(_), _) => "must be 0.001 to 1e6: the stored value of one metre, for example 1000 for millimetres or 5000 for TUM".to_owned(),
@@ -162,8 +167,7 @@ fn whole_numbers_between(values: &[f64]) -> Option<[f64; 2]> {
     let known = || values.iter().copied().filter(|&z| usable(z) && z < FARTHEST_M);
     let whole = known().all(|z| z.fract() == 0.0 && z > WHOLE_ABOVE);
     let [least, most] = known().fold([f64::INFINITY, 0.0], |[least, most], z| [z.min(least), z.max(most)]);
-    // One distance throughout is a plane, and no unit.
-    (whole && most > least).then_some([least, most])
+    (whole && most > 0.0).then_some([least, most])
 }
 
 /// Nothing is nearer than [`NEAREST_M`]; what claims to be is no measurement either.

@@ -8,7 +8,9 @@ use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, metadata::Orie
 use super::{
     ColorSpace, FrameFileError, FrameSpec,
     exr_planes::{Plane, read_exr},
+    png_chunks::PngChunks,
 };
+use crate::pictures::largest_of_16_bits;
 
 /// Linear R G B A (A = 1), row-major.
 pub(super) struct Color {
@@ -64,14 +66,12 @@ fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Resul
     if spec.color_space.is_none() && matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
         return Err(unsaid(format!("is missing: {} holds floats, which may be linear light or sRGB values: {needed}", path.display())));
     }
-    let gamma = if format == ImageFormat::Png { png_gamma(path) } else { None };
-    if let (None, Some(gamma)) = (spec.color_space, gamma.filter(|gamma| (gamma - SRGB_GAMMA).abs() > 0.01)) {
-        return Err(unsaid(format!(
-            "is missing: {} says that its values are light to the power of {gamma} (gAMA), as sRGB is not: {needed}",
-            path.display()
-        )));
+    let chunks = if format == ImageFormat::Png { PngChunks::read(path) } else { PngChunks::default() };
+    if let (None, Some(curve)) = (spec.color_space, chunks.other_curve()) {
+        return Err(unsaid(format!("is missing: {} says {curve}: {needed}", path.display())));
     }
-    let mut notes = Vec::new();
+    let mut notes: Vec<String> =
+        chunks.color_note().into_iter().chain(few_bits(&picture)).map(|note| format!("{}: {note}", path.display())).collect();
     if let Some(icc) = icc.filter(|icc| !icc.windows(4).any(|part| part == b"sRGB")) {
         let bytes = icc.len();
         notes.push(format!(
@@ -87,24 +87,13 @@ fn read_encoded_color(path: &Path, spec: &FrameSpec, frame_path: &Path) -> Resul
     Ok(Decoded { size_px, origin_px: None, centre_px, rgb: picture.to_rgb32f().into_raw(), notes })
 }
 
-/// What sRGB's curve comes nearest to, as PNG files say it.
-const SRGB_GAMMA: f64 = 0.454_55;
-
-/// The exponent that a PNG's header states, unless it says that it is sRGB.
-fn png_gamma(path: &Path) -> Option<f64> {
-    let bytes = std::fs::read(path).ok()?;
-    let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
-    let (mut at, mut found) = (8, None);
-    loop {
-        let length = word(at)? as usize;
-        match bytes.get(at + 4..at + 8)? {
-            b"sRGB" => return None,
-            b"gAMA" => found = word(at + 8).map(|value| f64::from(value) / 1e5),
-            b"IDAT" | b"IEND" => return found,
-            _ => {}
-        }
-        at = at.checked_add(length.checked_add(12)?)?;
-    }
+/// Where 16 bits hold fewer.
+fn few_bits(picture: &DynamicImage) -> Option<String> {
+    let largest = largest_of_16_bits(picture).filter(|largest| (1..1 << 14).contains(largest))?;
+    let white = (1_u32 << (u16::BITS - largest.leading_zeros())) - 1;
+    Some(format!(
+        "its values of 16 bits end at {largest} of 65535, which is white: the picture is nearly black. If white is {white}, multiply its values by 65535 / {white}"
+    ))
 }
 
 /// The share of pixels with alpha below 1, if there are any.

@@ -59,6 +59,13 @@ const FILES: &[(&str, &str, &str)] = &[
     ),
     ("PFM of three channels (`PF`)", "refused", "depth is of one"),
     ("TIFF: GDAL_NODATA", "applied", "what is that number is no depth"),
+    (
+        "TIFF: SCALE, OFFSET, UNITTYPE (GDAL_METADATA, `.aux.xml`)",
+        "applied",
+        "`scale x stored + offset` in that unit, metres where none is stated; a warning tells of them. Refused where depth_per_metre says another, or the unit is not known",
+    ),
+    ("TIFF: mask of its own, `.msk`", "applied", "what they leave out is no depth"),
+    ("PNG of depth: sBIT, pCAL, sCAL", "named", ""),
     ("TIFF: kinds of samples", "applied", "16, 32 and 64-bit floats, 16-bit whole numbers; others are refused"),
     (".npy: descr", "applied", "f2, f4, f8, u2, u4, i2, i4, i8 in both byte orders; others are refused"),
     (".npy: fortran_order, shape", "applied", "(H, W), (H, W, 1), (1, H, W); other shapes are refused"),
@@ -76,6 +83,9 @@ const FILES: &[(&str, &str, &str)] = &[
     ("EXIF orientation of colour or depth", "refused", "a turned picture and its depth may be of either sense"),
     ("ICC profile", "named", "unless it is one of sRGB"),
     ("PNG: gAMA", "refused", "where it is not that of sRGB and color_space is left out"),
+    ("PNG: cICP", "refused", "where its curve is not that of sRGB and color_space is left out; else named where it is not 1, 13, 0, 1"),
+    ("PNG: cHRM", "named", "where it is not that of sRGB"),
+    ("colours of 16 bits that end below 16384", "named", "as those of 10, 12 or 14 bits do, with their white"),
     ("alpha of colour", "named", "where a pixel has some below 1"),
     (
         "poses: header",

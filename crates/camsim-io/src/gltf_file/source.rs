@@ -90,6 +90,12 @@ impl Source {
         self.json.pointer(&pointer).and_then(Value::as_bool).unwrap_or(true)
     }
 
+    /// The first nodes that it hides, as messages call them.
+    pub fn hidden_nodes(&self) -> Vec<String> {
+        let hidden = self.document.nodes().map(|node| node.index()).filter(|&node| !self.is_visible(node));
+        hidden.take(4).map(|node| format!("nodes.{node}")).collect()
+    }
+
     /// `KHR_materials_emissive_strength`: what emitted light is multiplied by.
     pub fn emissive_strength(&self, material: Option<usize>) -> f32 {
         let at = |material| format!("/materials/{material}/extensions/KHR_materials_emissive_strength/emissiveStrength");

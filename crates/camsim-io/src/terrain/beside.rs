@@ -45,7 +45,7 @@ pub(crate) fn files(path: &Path) -> Vec<PathBuf> {
 }
 
 /// What `.aux.xml` and `.prj` add to tags.
-pub(super) fn read_tags(path: &Path, geo: &mut GeoTags) -> Result<(), TerrainFileError> {
+pub(crate) fn read_tags(path: &Path, geo: &mut GeoTags) -> Result<(), TerrainFileError> {
     let aux = [with_more(path, ".aux.xml"), path.with_extension("aux.xml")].into_iter().find(|aux| aux.is_file());
     if let Some(aux) = aux {
         let wrong = |problem: String| TerrainFileError::Meaning { path: aux.clone(), problem };
@@ -62,7 +62,7 @@ pub(super) fn read_tags(path: &Path, geo: &mut GeoTags) -> Result<(), TerrainFil
 }
 
 /// What a mask beside a raster leaves out.
-pub(super) fn read_mask(path: &Path, raster: &mut Raster) -> Result<(), crate::pictures::PictureError> {
+pub(crate) fn read_mask(path: &Path, raster: &mut Raster) -> Result<(), crate::pictures::PictureError> {
     let mask = with_more(path, ".msk");
     if mask.is_file() { raster.leave_out_by(&mask) } else { Ok(()) }
 }

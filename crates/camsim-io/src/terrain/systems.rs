@@ -129,7 +129,7 @@ pub(super) fn unit_of_code(code: u16) -> Option<f64> {
 }
 
 /// Metres in a unit by its name.
-pub(super) fn unit_of_name(name: &str) -> Option<f64> {
+pub(crate) fn unit_of_name(name: &str) -> Option<f64> {
     let name = name.trim().to_lowercase().replace(['_', '-'], " ").replace(['.', '[', ']', '(', ')'], "");
     Some(match name.as_str() {
         "m" | "metre" | "metres" | "meter" | "meters" => 1.0,

@@ -112,3 +112,89 @@ fn what_is_wrong_with_a_depth_is_said() {
         assert!(error.contains(wanted), "{text}\n  gives {error}\n  not   {wanted}");
     }
 }
+
+/// A TIFF of six floats of 3x2 with GDAL's metadata.
+fn with_items(value: f32, items: &str) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+    let mut image = encoder.new_image::<colortype::Gray32Float>(3, 2).unwrap();
+    let text = format!("<GDALMetadata>{items}</GDALMetadata>");
+    image.encoder().write_tag(tiff::tags::Tag::Unknown(42112), text.as_str()).unwrap();
+    image.write_data(&[value; 6]).unwrap();
+    bytes.into_inner()
+}
+
+#[test]
+fn scale_offset_and_unit_of_a_tiff_are_applied_or_contradict() {
+    let scale = "<Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.001</Item>";
+    let offset = "<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">1</Item>";
+    let feet = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">ft</Item>";
+    let px = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">px</Item>";
+    for (value, items, text, depth_m) in [
+        (2000.0, scale.to_owned(), "", 2.0),
+        (2000.0, scale.to_owned(), "depth_per_metre = 1000\n", 2.0),
+        (1000.0, format!("{scale}{offset}"), "", 2.0),
+        (10.0, feet.to_owned(), "", 3.048),
+        (2000.0, px.to_owned(), "depth_per_metre = 1000\n", 2.0),
+    ] {
+        let found = inverse("d.tif", &with_items(value, &items), text)[0];
+        assert!((f64::from(found) * depth_m - 1.0).abs() < 1e-6, "{items} {text}: {found}");
+    }
+    let notes = read("d.tif", &with_items(2000.0, scale), "").unwrap().notes;
+    assert!(notes[0].contains("SCALE 0.001"), "{notes:?}");
+    for (items, text, wanted) in [
+        (scale, "depth_per_metre = 1\n", "depth_per_metre: is 1, but"),
+        (offset, "depth_per_metre = 1000\n", "OFFSET 1"),
+        (px, "", "UNITTYPE `px`"),
+        (feet, "depth_kind = \"inverse\"\ndepth_per_metre = 1\n", "depth_kind: is \"inverse\", but"),
+        // One distance throughout is as unsure as many.
+        ("", "", "depth_per_metre: is missing: depth is of floats, which are metres, but all of them are whole numbers from 2000"),
+    ] {
+        let error = read("d.tif", &with_items(2000.0, items), text).unwrap_err();
+        assert!(error.contains(wanted), "{error}\n  not {wanted}");
+    }
+}
+
+#[test]
+fn what_a_mask_beside_a_tiff_leaves_out_is_no_depth() {
+    let folder = tempfile::tempdir().unwrap();
+    image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(folder.path().join("c.png")).unwrap();
+    fs::write(folder.path().join("d.tif"), tiff::<colortype::Gray32Float>(&[2.0; 6])).unwrap();
+    fs::write(folder.path().join("d.tif.msk"), tiff::<colortype::Gray8>(&[255, 0, 255, 255, 255, 0])).unwrap();
+    let path = folder.path().join("FRAME.toml");
+    fs::write(&path, "color = \"c.png\"\ndepth = \"d.tif\"\nfocal_px = [2, 2]\n").unwrap();
+    assert_eq!(read_frame(&path).unwrap().frame.inverse_depth, [0.5, 0.0, 0.5, 0.5, 0.5, 0.0]);
+}
+
+#[test]
+fn chunks_of_a_png_are_named_or_asked_about() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    image::RgbImage::from_pixel(3, 2, image::Rgb([9; 3])).save(at("c.png")).unwrap();
+    image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 2, vec![2000_u16; 6]).unwrap().save(at("d.png")).unwrap();
+    let [color, depth] = ["c.png", "d.png"].map(|name| fs::read(at(name)).unwrap());
+    let with = |png: &[u8], kind: &[u8], data: &[u8]| {
+        let chunk = [kind, data].concat();
+        let crc = crc32fast::hash(&chunk).to_be_bytes();
+        [&png[..33], &(data.len() as u32).to_be_bytes(), &chunk, &crc, &png[33..]].concat()
+    };
+    let path = at("FRAME.toml");
+    let read = |color: &[u8], depth: &[u8], text: &str| {
+        fs::write(at("c.png"), color).unwrap();
+        fs::write(at("d.png"), depth).unwrap();
+        fs::write(&path, format!("color = \"c.png\"\ndepth = \"d.png\"\ndepth_per_metre = 1000\nfocal_px = [2, 2]\n{text}")).unwrap();
+        read_frame(&path).map(|file| file.notes).map_err(|error| error.to_string())
+    };
+    let pq = with(&color, b"cICP", &[9, 16, 0, 1]);
+    assert!(read(&pq, &depth, "").unwrap_err().contains("color_space: is missing"));
+    assert!(read(&pq, &depth, "color_space = \"srgb\"\n").unwrap()[0].contains("cICP [9, 16, 0, 1]"));
+    assert!(read(&with(&color, b"cICP", &[12, 13, 0, 1]), &depth, "").unwrap()[0].contains("cICP [12, 13, 0, 1]"));
+    assert!(read(&with(&color, b"cICP", &[1, 13, 0, 1]), &depth, "").unwrap().is_empty());
+    let wide: Vec<u8> = [31_270_u32, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600].iter().flat_map(|v| v.to_be_bytes()).collect();
+    assert!(read(&with(&color, b"cHRM", &wide), &depth, "").unwrap()[0].contains("cHRM"));
+    assert!(read(&color, &with(&depth, b"sBIT", &[12]), "").unwrap()[0].contains("its sBIT is not applied"));
+    let twelve = image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(3, 2, image::Rgb([4095_u16, 9, 9]));
+    twelve.save(at("twelve.png")).unwrap();
+    let notes = read(&fs::read(at("twelve.png")).unwrap(), &depth, "").unwrap();
+    assert!(notes[0].contains("end at 4095 of 65535") && notes[0].contains("If white is 4095"), "{notes:?}");
+}

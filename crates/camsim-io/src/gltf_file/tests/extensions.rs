@@ -72,6 +72,9 @@ fn visibility_goes_down_the_tree_and_not_beside_it() {
         [of(&shown, &shown), of(&hidden, &shown), of(&shown, &hidden), of(&json!({ "KHR_node_visibility": {} }), &json!({}))],
         [4, 2, 2, 4]
     );
+    let nodes = json!([{ "mesh": 0, "extensions": hidden }]);
+    let model = with(&[("/nodes", nodes), ("/scenes", json!([{ "nodes": [0] }]))]).unwrap();
+    assert!(model.notes[0].contains("no triangles that are visible: KHR_node_visibility hides nodes.0"), "{:?}", model.notes);
     // A node that is within itself is no tree, seen or not.
     let nodes = json!([{ "children": [1], "extensions": hidden }, { "children": [1], "mesh": 0 }]);
     assert!(with(&[("/nodes", nodes)]).unwrap_err().contains("has two parents"));
