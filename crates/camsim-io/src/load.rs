@@ -341,20 +341,29 @@ fn warnings(sequence: &Sequence, log: &FlightLog, tracked: &Tracked, terrain: Op
         let step = (sequence.frames / 200).max(1);
         let places =
             (0..sequence.frames).step_by(step as usize).map(|i| sequence.path.pose(sequence.start_s + i as f64 / fps).position_ned_m);
-        let (mut over, mut below, mut all) = (0, 0, 0);
+        let (mut over, mut beside, mut below, mut all) = (0, 0, 0, 0);
         for place in places {
             all += 1;
             if let Some(ground_down_m) = terrain.down_at(place.x, place.y) {
                 over += 1;
                 below += u32::from(place.z > ground_down_m);
+            } else if !(terrain.bounds.min.x..=terrain.bounds.max.x).contains(&place.x)
+                || !(terrain.bounds.min.y..=terrain.bounds.max.y).contains(&place.y)
+            {
+                beside += 1;
             }
         }
         let [lat, lon] = summary.centre_rad.map(f64::to_degrees);
-        if over == 0 {
+        if over == 0 && beside < all {
+            warnings.push(format!(
+                "the flight is never over ground: {} of {all} places looked at lie over parts of the terrain without heights (missing, masked or not plausible)",
+                all - beside
+            ));
+        } else if over == 0 {
             warnings.push(format!("the flight is never over the terrain, whose middle is at latitude {lat:.5}, longitude {lon:.5} deg"));
         } else if below > 0 {
             warnings.push(format!(
-                "the camera is below the ground in {below} of {all} places looked at: check flight.height and scene.terrain.height"
+                "the camera is below the ground in {below} of {all} places looked at: check flight.height, scene.terrain.height and scene.terrain.height_unit"
             ));
         }
     }

@@ -1,5 +1,6 @@
 //! Terrain from a GeoTIFF of heights and a picture of the ground.
 
+mod arc_prj;
 mod bands;
 mod beside;
 mod crs;
@@ -15,6 +16,7 @@ mod shade;
 mod systems;
 mod tiff_file;
 mod wkt;
+mod words;
 
 use std::{
     path::PathBuf,
@@ -260,6 +262,13 @@ pub fn read_terrain_in_light(
             "{}: {} of its numbers are no heights in metres (-11 500 to 9500) and are taken as missing: if they are of another unit, set scene.terrain.height_unit",
             spec.dem.display(),
             heights.implausible
+        ));
+    }
+    if heights.unlikely > 0 {
+        notes.push(format!(
+            "{}: {} of its heights are below -500 m or above 9000 m: where that is not the floor of a sea, check scene.terrain.height_unit and the file's mark of missing values",
+            spec.dem.display(),
+            heights.unlikely
         ));
     }
     let is_void = spec.beyond == Beyond::Void;

@@ -31,6 +31,11 @@ pub(super) struct ColorBands {
     pub notes: Vec<String>,
 }
 
+/// Some writers call any fourth band alpha in the tags, and say in GDAL's words that it is none.
+pub(super) fn may_be_alpha(meaning: Option<&BandMeaning>) -> bool {
+    meaning.and_then(|band| band.color.as_ref()).is_none_or(|color| color.eq_ignore_ascii_case("Alpha"))
+}
+
 impl ColorBands {
     pub fn of(image: &Image, meanings: &[BandMeaning], has_palette: bool) -> Result<Self, String> {
         let mut notes = Vec::new();
@@ -40,8 +45,11 @@ impl ColorBands {
                 .position(|band| band.color.as_deref().is_some_and(|color| color.eq_ignore_ascii_case(name)))
                 .filter(|band| *band < image.bands)
         };
-        let extra =
-            |kind: u64| image.extra.iter().position(|extra| *extra == kind).and_then(|k| (image.bands + k).checked_sub(image.extra.len()));
+        let extra = |kind: u64| {
+            let place = |k: usize| (image.bands + k).checked_sub(image.extra.len());
+            let kinds = image.extra.iter().enumerate().filter(|(_, extra)| **extra == kind);
+            kinds.filter_map(|(k, _)| place(k)).find(|band| may_be_alpha(meanings.get(*band)))
+        };
         let alpha = named("Alpha").or_else(|| extra(UNASSOCIATED)).or_else(|| extra(ASSOCIATED));
         let is_premultiplied = alpha.is_some() && alpha == extra(ASSOCIATED);
         let rgb = match [named("Red"), named("Green"), named("Blue")] {

@@ -20,7 +20,19 @@ pub(crate) const FILES: &[(&str, &str, &str)] = &[
     (
         "`.prj` (`dem.prj`)",
         "coordinate system",
-        "applied where the raster says nothing: by its EPSG code, or by the names that ESRI gives to known systems; others are refused",
+        "applied where the raster says nothing: by its EPSG code, or by the names that ESRI gives to known systems; others are refused. A unit of coordinates that is not that \
+         of the system is refused",
+    ),
+    (
+        "vertical system in `.prj` or `<SRS>`",
+        "unit, datum and direction of heights",
+        "unit applied, also where the raster or scene.terrain.epsg gives the horizontal system; refused where it contradicts another; a datum that contradicts \
+         scene.terrain.height warns; depths and a shift are refused",
+    ),
+    (
+        "`.prj` of ARC/INFO (`Projection UTM`)",
+        "Zunits, Units, Zone, Xshift, Yshift",
+        "Zunits applied; refused without scene.terrain.epsg, and where Units or Zone are not its own or where there is a shift",
     ),
     ("`.ovr`", "smaller versions", "changes no number"),
 ];
@@ -54,9 +66,11 @@ pub(crate) fn read_tags(path: &Path, geo: &mut GeoTags) -> Result<(), TerrainFil
         merge(geo, &aux, metadata).map_err(|what| wrong(format!("{what}, and the raster itself says another: remove one of them")))?;
     }
     let prj = ["prj", "PRJ"].map(|extension| path.with_extension(extension)).into_iter().find(|prj| prj.is_file());
-    if let Some(prj) = prj.filter(|_| geo.wkt.is_none()) {
+    if let Some(prj) = prj {
         let wrong = |error: std::io::Error| TerrainFileError::Meaning { path: prj.clone(), problem: format!("cannot be read: {error}") };
-        geo.wkt = Some((prj.clone(), std::fs::read_to_string(&prj).map_err(wrong)?));
+        // What ARC/INFO wrote may be in any encoding.
+        let bytes = std::fs::read(&prj).map_err(wrong)?;
+        geo.texts.push((prj.clone(), String::from_utf8_lossy(&bytes).into_owned()));
     }
     Ok(())
 }
@@ -93,6 +107,8 @@ fn merge(geo: &mut GeoTags, path: &Path, aux: Metadata) -> Result<(), String> {
         }
     }
     one(&mut geo.model_from_pixel, aux.model_from_pixel, "GeoTransform")?;
-    geo.wkt = aux.wkt.map(|text| (path.into(), text));
+    geo.texts.extend(aux.wkt.map(|text| (path.into(), text)));
+    geo.items.extend(aux.items);
+    geo.descriptions.extend(aux.descriptions);
     Ok(())
 }

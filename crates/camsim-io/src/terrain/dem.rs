@@ -7,18 +7,27 @@ use rayon::prelude::*;
 use camsim_core::scenario::{HeightReference, TerrainSpec};
 
 use super::{
-    TerrainFileError, beside,
+    TerrainFileError,
+    bands::may_be_alpha,
+    beside,
     crs::{Crs, compound},
     geo_tags::GeoTags,
     georeference::{self, Affine, world_file},
     height_files,
     raster::Raster,
-    systems::{Datum, Stated, Vertical, unit_of_code, unit_of_name},
+    systems::{Datum, SAME_UNIT_M, Stated, Vertical, unit_of_code, unit_of_name},
     tiff_file::Sample,
+    words,
 };
 
 /// Heights outside of this are garbage or undeclared "no data" marks, metres: from below the deepest sea to above the highest mountain.
 const PLAUSIBLE_HEIGHTS_M: [f64; 2] = [-11_500.0, 9_500.0];
+
+/// Heights outside of this are rare enough to be spoken of, metres.
+const USUAL_HEIGHTS_M: [f64; 2] = [-500.0, 9_000.0];
+
+/// Programs that compute with a mark miss it by as much, in parts of it. Marks that may be heights are met exactly.
+const MARK_TOLERANCE: f64 = 1e-5;
 
 /// What lies outside of it but within this may be a height in another unit; marks lie farther away.
 const NUMBERS_NOT_MARKS: f64 = 1e6;
@@ -32,6 +41,8 @@ pub(super) struct Dem {
     pub size: [u32; 2],
     /// As the file has them: a sixth of what points in f64 would take.
     raster: Raster,
+    /// Whether its second band says where there is something.
+    has_alpha: bool,
     /// Whether the file counts columns from the east, rows from the south.
     is_reversed: [bool; 2],
     /// Metres of a stored number: this times it, and this more.
@@ -51,6 +62,8 @@ pub(super) struct Heights {
     pub voids: u64,
     /// Of the voids: numbers that may be heights in another unit.
     pub implausible: u64,
+    /// Heights that are deeper or higher than nearly all land.
+    pub unlikely: u64,
 }
 
 pub(super) const EMPTY_RANGE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
@@ -77,10 +90,15 @@ impl Dem {
         }
         notes.extend(geo.notes.iter().cloned());
         let of_key = spec.epsg.and_then(compound).map(|[_, vertical]| vertical);
-        let vertical = stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
-        notes.extend(vertical.as_ref().and_then(|vertical| vertical.note(spec.height, converts)));
-        if vertical.is_none() && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955) && spec.height == HeightReference::Msl {
-            let three = Vertical { code: crs.epsg, datum: Some(Datum::Ellipsoid), name: crs.name.clone(), metres_per_unit: Some(1.0) };
+        if let Some(problem) = &stated.problem {
+            return Err(TerrainFileError::Meaning { path: path.into(), problem: problem.clone() });
+        }
+        let own_vertical = stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
+        let verticals: Vec<&Vertical> = own_vertical.iter().chain(&stated.beside).collect();
+        notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, converts)));
+        if verticals.is_empty() && matches!(crs.epsg, 4979 | 4937 | 6319 | 4955) && spec.height == HeightReference::Msl {
+            let three =
+                Vertical { code: Some(crs.epsg), datum: Some(Datum::Ellipsoid), name: crs.name.clone(), metres_per_unit: Some(1.0) };
             notes.extend(three.note(spec.height, converts));
         }
         notes.extend(crs.accuracy_m.filter(|metres| *metres >= 2.0).map(|metres| {
@@ -89,21 +107,34 @@ impl Dem {
                 crs.epsg, crs.name
             )
         }));
-        if raster.bands() == 2 && !raster.image.extra.iter().any(|extra| matches!(extra, 1 | 2)) {
+        let has_alpha =
+            raster.bands() == 2 && raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2)) && may_be_alpha(geo.bands.get(1));
+        if raster.bands() == 2 && !has_alpha {
             notes.push("holds a second band, which is left out".to_owned());
         }
         if let Some(orientation) = geo.orientation {
             notes.push(format!("its orientation (tag 274: {orientation}) is not used: rows and columns lie where the georeference says"));
         }
-        let unit_m = unit_m(spec, geo, vertical.as_ref(), &crs)?;
-        let [scale, offset] = scale_and_offset(path, geo, vertical.is_some(), &mut notes)?;
+        let unit_m = unit_m(spec, geo, &verticals, &stated.height_units, &crs, &mut notes)?;
+        let [scale, offset] = scale_and_offset(path, geo, own_vertical.is_some(), &mut notes)?;
+        notes.extend(words::notes(geo, unit_m, [scale, offset], spec.height_unit.is_some()));
         // Where no mark is declared, the usual ones are marks.
         let lowest = if raster.image.sample == Sample::I16 { f64::from(i16::MIN) } else { COMMON_NODATA };
         let nodata = geo.nodata.map_or([COMMON_NODATA, lowest], |mark| [mark; 2]);
         let notes = notes.into_iter().map(|note| format!("{}: {note}", path.display())).collect();
         let metres = [unit_m * scale, unit_m * offset];
-        let mut dem =
-            Self { path: path.into(), size: raster.size, raster, is_reversed: [false; 2], metres, nodata, model_from_pixel, crs, notes };
+        let mut dem = Self {
+            path: path.into(),
+            size: raster.size,
+            raster,
+            has_alpha,
+            is_reversed: [false; 2],
+            metres,
+            nodata,
+            model_from_pixel,
+            crs,
+            notes,
+        };
         dem.turn_north_up();
         Ok(dem)
     }
@@ -142,20 +173,20 @@ impl Dem {
         let [column, row] = [0, 1].map(|k: usize| if self.is_reversed[k] { self.size[k] - 1 - at[k] } else { at[k] } as usize);
         let pixel = row * self.size[0] as usize + column;
         let stored = self.raster.value(pixel);
-        // A float32 file may declare its mark with more digits than it holds.
-        let is_nodata = self.nodata.iter().any(|mark| stored == *mark || stored as f32 == *mark as f32);
-        let is_clear = self.raster.bands() == 2
-            && self.raster.image.extra.last().is_some_and(|extra| matches!(extra, 1 | 2))
-            && self.raster.image.value(pixel, 1) == 0.0;
+        let is_nodata = self.nodata.iter().any(|mark| is_mark(stored, *mark));
+        let is_clear = self.has_alpha && self.raster.image.value(pixel, 1) == 0.0;
         if is_nodata || is_clear || !self.raster.is_valid(pixel) { f64::NAN } else { stored * self.metres[0] + self.metres[1] }
     }
 
     pub fn heights(&self) -> Heights {
-        let none = || Heights { range_m: EMPTY_RANGE, voids: 0, implausible: 0 };
+        let none = || Heights { range_m: EMPTY_RANGE, voids: 0, implausible: 0, unlikely: 0 };
         let [lowest, highest] = PLAUSIBLE_HEIGHTS_M;
         let rows = (0..self.size[1]).into_par_iter().map(|row| {
             (0..self.size[0]).fold(none(), |all, column| match self.stored_m([column, row]) {
-                m if (lowest..=highest).contains(&m) => Heights { range_m: widened(all.range_m, m), ..all },
+                m if (lowest..=highest).contains(&m) => {
+                    let is_usual = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&m);
+                    Heights { range_m: widened(all.range_m, m), unlikely: all.unlikely + u64::from(!is_usual), ..all }
+                }
                 m => Heights { voids: all.voids + 1, implausible: all.implausible + u64::from(m.abs() < NUMBERS_NOT_MARKS), ..all },
             })
         });
@@ -163,6 +194,7 @@ impl Dem {
             range_m: widened(widened(a.range_m, b.range_m[0]), b.range_m[1]),
             voids: a.voids + b.voids,
             implausible: a.implausible + b.implausible,
+            unlikely: a.unlikely + b.unlikely,
         })
     }
 
@@ -196,8 +228,22 @@ impl Dem {
     }
 }
 
+/// Whether a stored number is the mark of missing values.
+fn is_mark(stored: f64, mark: f64) -> bool {
+    let may_be_height = (USUAL_HEIGHTS_M[0]..=USUAL_HEIGHTS_M[1]).contains(&mark);
+    // A float32 file may declare its mark with more digits than it holds.
+    stored == mark || stored as f32 == mark as f32 || !may_be_height && (stored - mark).abs() <= MARK_TOLERANCE * mark.abs()
+}
+
 /// Metres in the unit of the heights. Where the file says two units or where it may be one of two, the key decides.
-fn unit_m(spec: &TerrainSpec, geo: &GeoTags, vertical: Option<&Vertical>, crs: &Crs) -> Result<f64, TerrainFileError> {
+fn unit_m(
+    spec: &TerrainSpec,
+    geo: &GeoTags,
+    verticals: &[&Vertical],
+    by_name: &[(String, String)],
+    crs: &Crs,
+    notes: &mut Vec<String>,
+) -> Result<f64, TerrainFileError> {
     let path = &spec.dem;
     let meaning = |problem: String| TerrainFileError::Meaning { path: path.clone(), problem };
     let unit_of_key = spec.height_unit.map(|unit| unit.metres());
@@ -213,13 +259,29 @@ fn unit_m(spec: &TerrainSpec, geo: &GeoTags, vertical: Option<&Vertical>, crs: &
             None => {}
         }
     }
-    if let Some(Vertical { code, name, metres_per_unit: Some(unit), .. }) = vertical {
+    for (name, from) in by_name {
+        match unit_of_name(name) {
+            // ARC/INFO's feet may be either.
+            Some(unit) if unit_of_key.is_some_and(|key| (key - unit).abs() < 1e-6) => {}
+            Some(unit) => stated.push((format!("{from} {name}"), unit)),
+            None if unit_of_key.is_none() => {
+                return Err(meaning(format!(
+                    "{from} is `{name}`, which is no unit that is known: set scene.terrain.height_unit = \"m\", \"ft\" or \"us-ft\""
+                )));
+            }
+            None => {}
+        }
+    }
+    for vertical in verticals {
+        let Some(unit) = &vertical.metres_per_unit else { continue };
+        let label = vertical.code.map_or_else(|| vertical.name.clone(), |code| format!("EPSG:{code} ({})", vertical.name));
         if *unit < 0.0 {
             return Err(meaning(format!(
-                "states depths (EPSG:{code}, {name}), which count downwards: turn them into heights with `gdal_calc.py -A IN --calc=-A --outfile OUT`"
+                "states depths ({}), which count downwards: turn them into heights with `gdal_calc.py -A IN --calc=-A --outfile OUT`",
+                vertical.label()
             )));
         }
-        stated.push((format!("EPSG:{code} ({name})"), *unit));
+        stated.push((label, *unit));
     }
     if let Some(code) = geo.keys.vertical_unit {
         match unit_of_code(code) {
@@ -228,7 +290,14 @@ fn unit_m(spec: &TerrainSpec, geo: &GeoTags, vertical: Option<&Vertical>, crs: &
             None => {}
         }
     }
-    let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    let of_tags = stated.len();
+    stated.extend(words::units(geo).filter_map(|(name, value)| Some((format!("item {name} `{value}`"), unit_of_name(value)?))));
+    if let (0, None, Some((text, unit))) = (of_tags, unit_of_key, stated.first().filter(|(_, unit)| *unit != 1.0)) {
+        notes.push(format!(
+            "its heights are taken in units of {unit} m, by its {text}: if that is not of heights, set scene.terrain.height_unit after removing it"
+        ));
+    }
+    let close = |a: f64, b: f64| (a - b).abs() < SAME_UNIT_M;
     let agree = stated.windows(2).all(|pair| close(pair[0].1, pair[1].1));
     let all = || stated.iter().map(|(text, unit)| format!("{text} of {unit} m")).collect::<Vec<_>>().join(" and ");
     match (unit_of_key, stated.first()) {

@@ -20,8 +20,12 @@ pub(crate) struct GeoTags {
     pub vertical_scale: Option<[f64; 2]>,
     /// Tag 274, unless it says that rows go down from the top left.
     pub orientation: Option<u64>,
-    /// Coordinate system as well-known text, with the file that it is in.
-    pub wkt: Option<(PathBuf, String)>,
+    /// Coordinate systems as text, with the files that they are in; the first goes first.
+    pub texts: Vec<(PathBuf, String)>,
+    /// Items that GDAL itself does not use, but which may speak of the first band: name and value.
+    pub items: Vec<(String, String)>,
+    /// What people wrote of the first band or the file.
+    pub descriptions: Vec<String>,
     /// What is left out.
     pub notes: Vec<String>,
 }
@@ -104,12 +108,17 @@ impl GeoTags {
         }
         if let Some(text) = tiff.text(of, tag::GDAL_METADATA)? {
             match Metadata::of_tag(&text) {
-                Ok(metadata) => tags.bands = metadata.bands,
+                Ok(metadata) => {
+                    tags.bands = metadata.bands;
+                    tags.items = metadata.items;
+                    tags.descriptions = metadata.descriptions;
+                }
                 Err(reason) => {
                     return Err(format!("its GDAL_METADATA (tag 42112) cannot be read, and a scale or a unit may be in it: {reason}"));
                 }
             }
         }
+        tags.descriptions.extend(tiff.text(of, tag::IMAGE_DESCRIPTION).ok().flatten());
         tags.orientation = tiff.integer(of, tag::ORIENTATION)?.filter(|orientation| !matches!(orientation, 0 | 1));
         if of.has(tag::RPC_COEFFICIENTS) {
             tags.notes.push("its rational camera model (RPC, tag 50844) is not used: a picture that is not orthorectified does not lie where its georeference says".into());

@@ -6,6 +6,7 @@ use camsim_core::scenario::HeightReference;
 
 use super::{
     TerrainFileError,
+    arc_prj::ArcPrj,
     crs::{Crs, VerticalCrs, compound},
     geo_tags::{GeoTags, USER_DEFINED},
     wkt,
@@ -18,7 +19,20 @@ pub(super) struct Stated {
     /// What it calls a system of its own, which has no code.
     pub own: Option<String>,
     pub vertical: Option<u16>,
+    /// Vertical systems in texts beside the raster.
+    pub beside: Vec<Vertical>,
+    /// Units of heights by name, with where they are from.
+    pub height_units: Vec<(String, String)>,
+    /// Why heights cannot be what a text says.
+    pub problem: Option<String>,
+    /// Of the text that gives the horizontal system, if it does: its file, and metres in its unit.
+    unit_of_text: Option<(String, f64)>,
+    /// The same of ARC/INFO.
+    arc: Option<(String, ArcPrj)>,
 }
+
+/// Units that differ by less are one: the two feet differ by six times as much.
+pub(super) const SAME_UNIT_M: f64 = 1e-7;
 
 impl Stated {
     pub fn of(path: &Path, geo: &GeoTags) -> Result<Self, TerrainFileError> {
@@ -44,19 +58,75 @@ impl Stated {
         }
         if stated.horizontal.is_none()
             && stated.own.is_none()
-            && let Some((from, text)) = &geo.wkt
+            && let Some((from, text)) = geo.texts.first()
         {
-            let codes = wkt::codes(text);
-            stated.horizontal = codes.horizontal;
-            stated.vertical = stated.vertical.or(codes.vertical);
-            let what = || format!("{} in {}", wkt::name(text), from.file_name().unwrap_or_default().to_string_lossy());
-            stated.own = codes.horizontal.is_none().then(what);
+            let file = from.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            stated.arc = ArcPrj::of(text).map(|arc| (file.clone(), arc));
+            stated.unit_of_text = wkt::horizontal_unit(text).map(|unit| (file.clone(), unit));
+            stated.horizontal = wkt::codes(text).horizontal;
+            let name = stated.arc.as_ref().map_or_else(|| wkt::name(text), |(_, arc)| &arc.name);
+            let what = format!("{name} in {file}");
+            stated.own = stated.horizontal.is_none().then_some(what);
         }
+        stated.read_heights(geo);
         if let Some([horizontal, vertical]) = stated.horizontal.and_then(compound) {
             stated.horizontal = Some(horizontal);
             stated.vertical = stated.vertical.or(Some(vertical));
         }
         Ok(stated)
+    }
+
+    /// What texts beside the raster say of heights.
+    fn read_heights(&mut self, geo: &GeoTags) {
+        for (from, text) in &geo.texts {
+            let file = from.file_name().unwrap_or_default().to_string_lossy();
+            if let Some(unit) = ArcPrj::of(text).and_then(|arc| arc.height_unit) {
+                self.height_units.push((unit, format!("Zunits in {file}")));
+            }
+            let Some(vertical) = wkt::vertical(text) else { continue };
+            if vertical.shift != 0.0 {
+                self.problem = Some(format!(
+                    "{file} states a shift of its heights (Vertical_Shift {}), which is not applied: apply it with `gdal_calc.py`, and set it to 0 there",
+                    vertical.shift
+                ));
+            }
+            self.beside.extend(Vertical::of_text(&vertical, &file));
+        }
+    }
+
+    /// Where a text beside the raster and the system that is taken do not agree.
+    fn contradiction(&self, crs: &Crs) -> Option<String> {
+        let unit = crs.metres_per_unit();
+        let of_crs = || format!("EPSG:{} ({})", crs.epsg, crs.name);
+        if let Some((file, stated)) = &self.unit_of_text
+            && unit.is_none_or(|unit| (unit - stated).abs() > SAME_UNIT_M)
+        {
+            return Some(format!(
+                "{file} states coordinates in units of {stated} m, which are not those of {}: correct one of them",
+                of_crs()
+            ));
+        }
+        let (file, arc) = self.arc.as_ref()?;
+        if let Some(name) = &arc.unit {
+            let is_same = match unit {
+                // Its feet may be either.
+                Some(unit) => unit_of_name(name).is_some_and(|stated| (stated - unit).abs() < 1e-6),
+                None => matches!(name.to_lowercase().as_str(), "dd" | "degrees" | "decimal degrees"),
+            };
+            if !is_same {
+                return Some(format!("{file} states `Units {name}`, which are not those of {}: correct one of them", of_crs()));
+            }
+        }
+        let is_utm = matches!(crs.epsg, 25801..=25860 | 26901..=26960 | 32601..=32660 | 32701..=32760);
+        if let Some(zone) = arc.utm_zone.filter(|zone| is_utm && crs.epsg % 100 != *zone) {
+            return Some(format!("{file} states UTM zone {zone}, which is not that of {}: correct one of them", of_crs()));
+        }
+        (arc.shifts != [0.0; 2]).then(|| {
+            format!(
+                "{file} states Xshift and Yshift {:?}, which are not taken off: do so in the header of the grid, and set them to 0",
+                arc.shifts
+            )
+        })
     }
 
     /// The horizontal system; `wanted` is the key's.
@@ -78,6 +148,9 @@ impl Stated {
             }
         };
         let crs = Crs::new(epsg).ok_or_else(|| TerrainFileError::UnsupportedCrs { path: path.into(), epsg })?;
+        if let Some(problem) = self.contradiction(&crs) {
+            return Err(TerrainFileError::Meaning { path: path.into(), problem });
+        }
         let unit = |what, code| TerrainFileError::Unit { path: path.into(), what, code };
         match crs.metres_per_unit() {
             // 9122: degrees, however a file may write them.
@@ -166,9 +239,10 @@ fn old_datum(code: u16) -> Option<(Datum, &'static str)> {
     })
 }
 
-/// What a vertical code says: its datum and name, and metres in its unit.
+/// What a vertical code or text says: its datum and name, and metres in its unit.
+#[derive(Debug)]
 pub(super) struct Vertical {
-    pub code: u16,
+    pub code: Option<u16>,
     pub datum: Option<Datum>,
     pub name: String,
     pub metres_per_unit: Option<f64>,
@@ -177,12 +251,17 @@ pub(super) struct Vertical {
 impl Vertical {
     pub fn of(code: u16, citation: &str) -> Self {
         if let Some(crs) = VerticalCrs::new(code) {
-            return Self { code, datum: Some(Datum::SeaLevel), name: crs.name.into(), metres_per_unit: Some(crs.metres_per_unit) };
+            return Self {
+                code: Some(code),
+                datum: Some(Datum::SeaLevel),
+                name: crs.name.into(),
+                metres_per_unit: Some(crs.metres_per_unit),
+            };
         }
         match old_datum(code) {
-            Some((datum, name)) => Self { code, datum: Some(datum), name: name.into(), metres_per_unit: None },
+            Some((datum, name)) => Self { code: Some(code), datum: Some(datum), name: name.into(), metres_per_unit: None },
             None => Self {
-                code,
+                code: Some(code),
                 datum: None,
                 name: if citation.is_empty() { "no name".into() } else { citation.into() },
                 metres_per_unit: None,
@@ -190,23 +269,42 @@ impl Vertical {
         }
     }
 
+    /// Of a text in a file: by its code and by its own words, where these are two things.
+    fn of_text(text: &wkt::VerticalText, file: &str) -> Vec<Self> {
+        let datum = text.is_ellipsoid.map(|is_ellipsoid| if is_ellipsoid { Datum::Ellipsoid } else { Datum::SeaLevel });
+        let by_words = Self { code: text.code, datum, name: format!("{} in {file}", text.name), metres_per_unit: text.metres_per_unit };
+        let Some(known) = text.code.filter(|code| VerticalCrs::new(*code).is_some()) else { return vec![by_words] };
+        let mut by_code = Self::of(known, "");
+        by_code.name = format!("{} in {file}", by_code.name);
+        let is_same = match (by_code.metres_per_unit, text.metres_per_unit) {
+            (Some(a), Some(b)) => (a - b).abs() < SAME_UNIT_M,
+            _ => true,
+        };
+        if is_same { vec![by_code] } else { vec![by_code, Self { code: None, ..by_words }] }
+    }
+
+    /// Code and name.
+    pub fn label(&self) -> String {
+        self.code.map_or_else(|| self.name.clone(), |code| format!("EPSG:{code}, {}", self.name))
+    }
+
     /// Where it and `scene.terrain.height` do not agree. `converts`: whether heights go through the geoid.
     pub fn note(&self, height: HeightReference, converts: bool) -> Option<String> {
-        let Self { code, name, .. } = self;
+        let label = self.label();
         match (self.datum, height) {
             (Some(Datum::SeaLevel), HeightReference::Ellipsoid) => Some(format!(
-                "states heights above sea level (EPSG:{code}, {name}), but scene.terrain.height is \"ellipsoid\": set scene.terrain.height = \"msl\" \
+                "states heights above sea level ({label}), but scene.terrain.height is \"ellipsoid\": set scene.terrain.height = \"msl\" \
                  (the geoid is up to 100 m away from the ellipsoid), and flight.height as the log has it"
             )),
-            (Some(Datum::Ellipsoid), HeightReference::Msl) => Some(format!(
-                "states heights above the ellipsoid ({code}, {name}), but scene.terrain.height is \"msl\": set it to \"ellipsoid\""
-            )),
-            (Some(Datum::SeaLevel), HeightReference::Msl) if converts && *code != 5773 => {
-                Some(format!("its heights are of {name} (EPSG:{code}); EGM96, which they are converted with, may be a metre or so from it"))
+            (Some(Datum::Ellipsoid), HeightReference::Msl) => {
+                Some(format!("states heights above the ellipsoid ({label}), but scene.terrain.height is \"msl\": set it to \"ellipsoid\""))
             }
-            (None, _) => Some(format!(
-                "states a vertical system that is not known (EPSG:{code}, {name}); its heights are taken as scene.terrain.height says"
-            )),
+            (Some(Datum::SeaLevel), HeightReference::Msl) if converts && self.code != Some(5773) => {
+                Some(format!("its heights are of {label}; EGM96, which they are converted with, may be a metre or so from it"))
+            }
+            (None, _) => {
+                Some(format!("states a vertical system that is not known ({label}); its heights are taken as scene.terrain.height says"))
+            }
             _ => None,
         }
     }

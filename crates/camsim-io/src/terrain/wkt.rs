@@ -12,6 +12,19 @@ pub(super) struct Codes {
     pub vertical: Option<u16>,
 }
 
+/// What a text says of heights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct VerticalText {
+    pub code: Option<u16>,
+    pub name: String,
+    /// Its unit's size as the text has it; less than 0 where it counts downwards.
+    pub metres_per_unit: Option<f64>,
+    /// Whether it counts from an ellipsoid; `None` if it does not tell.
+    pub is_ellipsoid: Option<bool>,
+    /// ESRI's shift of heights, in its unit.
+    pub shift: f64,
+}
+
 /// Names of ESRI's for systems that EPSG calls otherwise, with ` ` for `_`.
 const ESRI: &[(&str, u16)] = &[
     ("GCS WGS 1984", 4326),
@@ -38,6 +51,55 @@ pub(super) fn codes(text: &str) -> Codes {
         return Codes { horizontal: horizontal.and_then(|part| code(part)), vertical: vertical.and_then(|part| stated(part)) };
     }
     Codes { horizontal: code(text), vertical: None }
+}
+
+/// The vertical system in a text: part of a compound one, or beside the horizontal one as ESRI writes it.
+pub(super) fn vertical(text: &str) -> Option<VerticalText> {
+    let all = format!("ALL[{}]", text.trim().trim_start_matches('\u{feff}'));
+    let definitions = children(&all).into_iter().flat_map(|part| {
+        let inside = if ["COMPD_CS", "COMPOUNDCRS"].iter().any(|word| part.starts_with(word)) { children(part) } else { Vec::new() };
+        std::iter::once(part).chain(inside)
+    });
+    let found =
+        definitions.into_iter().find(|part| ["VERT_CS", "VERTCRS", "VERTICALCRS", "VERTCS"].iter().any(|word| part.starts_with(word)))?;
+    let parts = children(found);
+    let starting = |words: &[&str]| parts.iter().copied().find(|part| words.iter().any(|word| part.starts_with(word)));
+    let parameter = |name: &str| {
+        parts.iter().find(|part| part.starts_with("PARAMETER") && self::name(part).eq_ignore_ascii_case(name)).and_then(|part| second(part))
+    };
+    let axis = starting(&["AXIS"]);
+    let is_down = parameter("Direction").is_some_and(|direction| direction < 0.0)
+        || axis.is_some_and(|axis| children(axis).iter().skip(1).any(|word| word.eq_ignore_ascii_case("down")));
+    let size = length_unit(found).or_else(|| axis.and_then(length_unit)).filter(|size| *size > 0.0);
+    let datum = starting(&["VDATUM", "VERT_DATUM", "VERTDATUM", "VERTICALDATUM", "VRF", "ENSEMBLE", "DATUM"]);
+    let is_ellipsoid = datum
+        .filter(|datum| !matches!(name(datum).to_lowercase().as_str(), "unknown" | "unnamed" | "local"))
+        .map(|datum| datum.starts_with("DATUM") || datum.starts_with("VERT_DATUM") && second(datum) == Some(2002.0));
+    Some(VerticalText {
+        code: stated(found),
+        name: name(found).to_owned(),
+        metres_per_unit: if is_down { Some(-size.unwrap_or(1.0)) } else { size },
+        is_ellipsoid,
+        shift: parameter("Vertical_Shift").unwrap_or(0.0),
+    })
+}
+
+/// Metres in the unit of a projected system, if the text states it.
+pub(super) fn horizontal_unit(text: &str) -> Option<f64> {
+    let text = text.trim().trim_start_matches('\u{feff}');
+    let parts = children(text);
+    let projected =
+        if text.starts_with("PROJ") { Some(text) } else { parts.into_iter().find(|part| part.starts_with("PROJ") && part.contains('[')) };
+    projected.and_then(length_unit)
+}
+
+fn length_unit(text: &str) -> Option<f64> {
+    children(text).into_iter().find(|part| part.starts_with("UNIT[") || part.starts_with("LENGTHUNIT[")).and_then(second)
+}
+
+/// The number behind a name.
+fn second(text: &str) -> Option<f64> {
+    children(text).get(1)?.trim_matches('"').parse().ok()
 }
 
 /// What a text is called: its first quoted word.
@@ -116,6 +178,7 @@ fn children(text: &str) -> Vec<&str> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used, reason = "tests")]
     use super::*;
 
     const UTM: &str = r#"PROJCS["WGS 84 / UTM zone 32N",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],AUTHORITY["EPSG","4326"]],UNIT["metre",1],AUTHORITY["EPSG","32632"]]"#;
@@ -136,5 +199,30 @@ mod tests {
         let both =
             format!(r#"COMPD_CS["both",{UTM},VERT_CS["EGM96 height",UNIT["metre",1],AUTHORITY["EPSG","5773"]],AUTHORITY["EPSG","9999"]]"#);
         assert_eq!(codes(&both), Codes { horizontal: Some(32632), vertical: Some(5773) });
+    }
+
+    #[test]
+    fn vertical_parts_have_unit_datum_and_direction() {
+        let esri = r#"VERTCS["NAVD88_height_(ftUS)",VDATUM["North_American_Vertical_Datum_1988"],PARAMETER["Vertical_Shift",0.0],PARAMETER["Direction",1.0],UNIT["Foot_US",0.304800609601219]]"#;
+        let expected = VerticalText {
+            code: None,
+            name: "NAVD88_height_(ftUS)".into(),
+            metres_per_unit: Some(0.304_800_609_601_219),
+            is_ellipsoid: Some(false),
+            shift: 0.0,
+        };
+        assert_eq!(vertical(&format!("{UTM},{esri}")), Some(expected.clone()));
+        let other = esri.replace("Direction\",1.0", "Direction\",-1.0").replace("Shift\",0.0", "Shift\",2.5");
+        let down = VerticalText { metres_per_unit: Some(-0.304_800_609_601_219), shift: 2.5, ..expected };
+        assert_eq!(vertical(&format!("{UTM},{other}")), Some(down));
+        let ellipsoid =
+            vertical(r#"VERTCS["WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.25]],UNIT["Meter",1.0]]"#).unwrap();
+        assert_eq!((ellipsoid.is_ellipsoid, ellipsoid.metres_per_unit), (Some(true), Some(1.0)));
+        let new = vertical(
+            r#"COMPOUNDCRS["c",PROJCRS["p",ID["EPSG",32632]],VERTCRS["d",VDATUM["v"],CS[vertical,1],AXIS["depth (D)",down,LENGTHUNIT["foot",0.3048]],ID["EPSG",5]]]"#,
+        )
+        .unwrap();
+        assert_eq!((new.code, new.metres_per_unit), (Some(5), Some(-0.3048)));
+        assert_eq!((vertical(UTM), horizontal_unit(UTM)), (None, Some(1.0)));
     }
 }
