@@ -42,6 +42,36 @@ fn ascii_grids_have_their_heights_and_place() {
     assert!((loaded.terrain.bounds.max.x - loaded.terrain.bounds.min.x) / 1e5 > 5e-6 && height_m(&loaded, [3, 2]).is_none());
 }
 
+/// A vertical system in the text beside a raster counts as one within it does.
+#[test]
+fn units_of_heights_beside_a_raster_are_applied() {
+    let folder = tempfile::tempdir().unwrap();
+    let vertical = r#",VERTCS["NAVD88_height_(ftUS)",VDATUM["North_American_Vertical_Datum_1988"],PARAMETER["Vertical_Shift",0.0],PARAMETER["Direction",1.0],UNIT["Foot_US",0.304800609601219]]"#;
+    let arc = "Projection    UTM\nZone          32\nDatum         WGS84\nZunits        FEET\nUnits         METERS\nSpheroid      WGS84\nParameters\n";
+    for (text, unit_m, warns) in [
+        (format!("{UTM_PRJ}{vertical}"), 0.304_800_609_601_219, true),
+        (arc.to_owned(), 0.3048, false),
+        (arc.replace("FEET", "METERS"), 1.0, false),
+        (UTM_PRJ.to_owned(), 1.0, false),
+    ] {
+        fs::write(folder.path().join("dem.prj"), &text).unwrap();
+        let loaded = read(&grid(folder.path(), &format!("{HEADER}{VALUES}"))).unwrap();
+        let found = height_m(&loaded, [1, 1]).unwrap();
+        assert!((found - 6.5 * unit_m).abs() < 1e-5, "{text}: {found}");
+        assert_eq!(loaded.notes.iter().any(|note| note.contains("scene.terrain.height = \"msl\"")), warns, "{text}: {:?}", loaded.notes);
+    }
+    fs::write(folder.path().join("dem.prj"), arc.replace("Units         METERS", "Units         FEET")).unwrap();
+    let error = fails(&grid(folder.path(), &format!("{HEADER}{VALUES}")));
+    assert!(error.contains("dem.prj"), "{error}");
+    fs::remove_file(folder.path().join("dem.prj")).unwrap();
+    // A mark that a program has computed with is met all the same; one that may be a height is met exactly.
+    let near = |mark: &str, void: &str| {
+        let text = format!("{}{}", HEADER.replace("-99", mark), VALUES.replace("-99", void));
+        height_m(&read(&grid(folder.path(), &text)).unwrap(), [3, 2])
+    };
+    assert_eq!((near("-9999", "-9999.0039"), near("-99", "-99.0001").is_some()), (None, true));
+}
+
 #[test]
 fn ascii_grids_that_are_none_are_refused() {
     let folder = tempfile::tempdir().unwrap();
