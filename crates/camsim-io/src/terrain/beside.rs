@@ -21,7 +21,7 @@ pub(crate) const FILES: &[(&str, &str, &str)] = &[
         "`.prj` (`dem.prj`)",
         "coordinate system",
         "applied where the raster says nothing: by its EPSG code, or by the names that ESRI gives to known systems; others are refused. A unit of coordinates that is not that \
-         of the system is refused",
+         of the system is refused, another system than the raster's own is named",
     ),
     (
         "vertical system in `.prj` or `<SRS>`",

@@ -93,6 +93,7 @@ impl Dem {
         if let Some(problem) = &stated.problem {
             return Err(TerrainFileError::Meaning { path: path.into(), problem: problem.clone() });
         }
+        notes.extend(stated.other.clone());
         let own_vertical = stated.vertical.or(of_key).map(|code| Vertical::of(code, &geo.keys.vertical_citation));
         let verticals: Vec<&Vertical> = own_vertical.iter().chain(&stated.beside).collect();
         notes.extend(verticals.iter().find_map(|vertical| vertical.note(spec.height, converts)));

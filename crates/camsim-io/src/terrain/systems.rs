@@ -19,6 +19,8 @@ pub(super) struct Stated {
     /// What it calls a system of its own, which has no code.
     pub own: Option<String>,
     pub vertical: Option<u16>,
+    /// A text beside the raster that states another horizontal system than the raster itself.
+    pub other: Option<String>,
     /// Vertical systems in texts beside the raster.
     pub beside: Vec<Vertical>,
     /// Units of heights by name, with where they are from.
@@ -33,6 +35,17 @@ pub(super) struct Stated {
 
 /// Units that differ by less are one: the two feet differ by six times as much.
 pub(super) const SAME_UNIT_M: f64 = 1e-7;
+
+/// Of the texts beside a raster the first that states another horizontal system than its own, `own`.
+fn other_system(geo: &GeoTags, own: u16) -> Option<String> {
+    geo.texts.iter().find_map(|(from, text)| {
+        let stated = wkt::codes(text).horizontal?;
+        let stated = compound(stated).map_or(stated, |[horizontal, _]| horizontal);
+        let file = from.file_name().unwrap_or_default().to_string_lossy();
+        (stated != own)
+            .then(|| format!("{file} states EPSG:{stated} and the raster itself EPSG:{own}, which is taken: correct one of them"))
+    })
+}
 
 impl Stated {
     pub fn of(path: &Path, geo: &GeoTags) -> Result<Self, TerrainFileError> {
@@ -73,6 +86,7 @@ impl Stated {
             stated.horizontal = Some(horizontal);
             stated.vertical = stated.vertical.or(Some(vertical));
         }
+        stated.other = stated.horizontal.and_then(|own| other_system(geo, own));
         Ok(stated)
     }
 

@@ -73,6 +73,20 @@ fn units_of_heights_beside_a_raster_are_applied() {
 }
 
 #[test]
+fn another_horizontal_system_beside_a_raster_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    Tiff::heights([4, 3], |column, row| (10 * row + column) as f32).write(&path);
+    for (zone, warns) in [("32N", false), ("33N", true)] {
+        fs::write(folder.path().join("dem.prj"), UTM_PRJ.replace("32N", zone)).unwrap();
+        let loaded = read(&spec(&path)).unwrap();
+        assert_eq!(loaded.summary.epsg, 32632);
+        let says = |note: &String| note.contains("dem.prj states EPSG:32633 and the raster itself EPSG:32632");
+        assert_eq!(loaded.notes.iter().any(says), warns, "{:?}", loaded.notes);
+    }
+}
+
+#[test]
 fn ascii_grids_that_are_none_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (text, says) in [
