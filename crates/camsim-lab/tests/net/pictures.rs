@@ -1,0 +1,143 @@
+//! Renders of the net: on the device and, where it can, on the host; checksums of their channels.
+
+use std::{collections::BTreeMap, convert::Infallible, fmt::Write};
+
+use camsim_core::frame::RenderedFrame;
+use camsim_gpu::{
+    AdapterChoice, Engine,
+    engine::Finished,
+    reverse::host::{self, ReverseOn},
+};
+
+use super::subjects::Subject;
+
+/// Of renders: so small that all of them take seconds.
+const SIZE_PX: [u32; 2] = [160, 120];
+/// Longest side of pictures that are held whole, where a subject is to have them in tiles.
+pub const MOST_PICTURE_PX: u32 = 512;
+
+/// What the golden file keeps of a channel of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kept {
+    pub checksum: u64,
+    /// Of all its numbers: what other adapters and processors can be held against.
+    pub mean: f64,
+}
+
+/// By subject, frame, renderer and channel.
+pub type Checksums = BTreeMap<String, Kept>;
+
+/// An engine with everything on the device, and one with what the host can do on the host.
+pub fn engines(most_picture_px: u32) -> [Engine; 2] {
+    [ReverseOn::Device, ReverseOn::Host].map(|place| {
+        let engine = Engine::new(AdapterChoice::Software);
+        let mut engine = engine.expect("tests need a software Vulkan adapter; CAMSIM_SKIP_GPU=1 skips them");
+        engine.limit_pictures(most_picture_px);
+        engine.set_reverse_on(place);
+        engine.set_ideal_on_host(place == ReverseOn::Host);
+        engine
+    })
+}
+
+/// What bits of a picture depend on beside camsim: adapter with its driver, and the processor.
+pub fn machine(engine: &Engine) -> String {
+    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+    format!("# adapter: {}\n# processor: {os} {arch}{}\n", engine.gpu().adapter, features())
+}
+
+#[cfg(target_arch = "x86_64")]
+fn features() -> String {
+    let has = [
+        ("avx", is_x86_feature_detected!("avx")),
+        ("avx2", is_x86_feature_detected!("avx2")),
+        ("fma", is_x86_feature_detected!("fma")),
+        ("f16c", is_x86_feature_detected!("f16c")),
+        ("avx512f", is_x86_feature_detected!("avx512f")),
+        ("avx512vl", is_x86_feature_detected!("avx512vl")),
+    ];
+    has.iter().filter(|(_, has)| *has).map(|(name, _)| format!(" {name}")).collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn features() -> String {
+    String::new()
+}
+
+/// The frames of a subject from the device, and those that the host serves from the host.
+pub fn render(engines: &[Engine; 2], subject: &Subject) -> [Vec<RenderedFrame>; 2] {
+    let sequence = subject.sequence(Some(SIZE_PX));
+    let frames_of = |engine: &Engine, frames: &[u64]| {
+        let mut finished = Vec::new();
+        let mut keep = |done: Finished| {
+            finished.push(done);
+            Ok(())
+        };
+        let session = engine.session::<Infallible>(sequence.clone(), subject.channels);
+        let mut session = session.expect(&subject.name);
+        session.render::<Infallible>(frames.iter().copied(), &mut keep).expect(&subject.name);
+        finished
+    };
+    let from_device = frames_of(&engines[0], &subject.frames);
+    let is_served = |done: &&Finished| host::serves(&done.plan);
+    let served: Vec<u64> = from_device.iter().filter(is_served).map(|done| done.frame.index).collect();
+    let from_host = if served.is_empty() { Vec::new() } else { frames_of(&engines[1], &served) };
+    assert!(from_device.iter().all(|done| done.times.reverse_ms.is_none()), "{}: device", subject.name);
+    assert!(from_host.iter().all(|done| done.times.reverse_ms.is_some()), "{}: host", subject.name);
+    [from_device, from_host].map(|finished| finished.into_iter().map(|done| done.frame).collect())
+}
+
+/// Adds the channels of a frame, and says what no picture may have.
+pub fn add(frame: &RenderedFrame, of: &str, checksums: &mut Checksums, faults: &mut Vec<String>) {
+    let mut add = |channel: &str, values: &[f32]| {
+        if !values.iter().all(|value| value.is_finite()) {
+            faults.push(format!("{of} {channel}: not finite"));
+        }
+        let checksum = fnv1a(values.iter().flat_map(|value| value.to_le_bytes()));
+        let mean = values.iter().map(|&value| f64::from(value)).sum::<f64>() / values.len() as f64;
+        checksums.insert(format!("{of} {channel}"), Kept { checksum, mean });
+    };
+    let valid: Vec<f32> = frame.color_rgba.iter().skip(3).step_by(4).copied().collect();
+    add("color", &frame.color_rgba);
+    add("valid", &valid);
+    frame.depth_m.iter().for_each(|depth_m| add("depth", depth_m));
+    frame.coords.iter().for_each(|coords| add("coords", coords.as_flattened()));
+    if !valid.iter().all(|&valid| valid == 0.0 || valid == 1.0) {
+        faults.push(format!("{of} valid: neither 0 nor 1"));
+    }
+    if frame.depth_m.iter().flatten().any(|&depth_m| depth_m < 0.0) {
+        faults.push(format!("{of} depth: below 0"));
+    }
+}
+
+/// Fowler, Noll and Vo's hash of 64 bits.
+fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// What the colours of two frames are apart, RMS, 1/255.
+pub fn apart_dn(a: &RenderedFrame, b: &RenderedFrame) -> f64 {
+    let squares = a.color_rgba.iter().zip(&b.color_rgba).map(|(a, b)| f64::from(a - b).powi(2));
+    255.0 * (squares.sum::<f64>() / a.color_rgba.len() as f64).sqrt()
+}
+
+/// One line each, below the machine.
+pub fn to_text(machine: &str, checksums: &Checksums) -> String {
+    let mut text = machine.to_owned();
+    for (key, Kept { checksum, mean }) in checksums {
+        writeln!(text, "{key} {checksum:016x} {mean:.6}").expect("a string takes all");
+    }
+    text
+}
+
+/// The machine that wrote the text, and its checksums.
+pub fn from_text(text: &str) -> (String, Checksums) {
+    let (machine, lines): (Vec<_>, Vec<_>) = text.lines().partition(|line| line.starts_with('#'));
+    let kept = |line: &str| {
+        let mut words = line.rsplitn(3, ' ');
+        let (mean, checksum, key) = (words.next()?, words.next()?, words.next()?);
+        let checksum = u64::from_str_radix(checksum, 16).ok()?;
+        Some((key.to_owned(), Kept { checksum, mean: mean.parse().ok()? }))
+    };
+    let checksums = lines.into_iter().map(|line| kept(line).unwrap_or_else(|| panic!("checksums: {line}")));
+    (machine.iter().map(|line| format!("{line}\n")).collect(), checksums.collect())
+}
