@@ -1,5 +1,5 @@
 #!/bin/sh
-# From a fresh clone to pictures: installs what is missing, builds, renders the built-in flight.
+# Installs what is missing, builds camsim and renders the built-in flight; needs only a clone of the repository and Rust.
 # Arguments go to `camsim demo`, e.g. sh scripts/demo.sh -o /tmp/frames
 set -eu
 cd "$(dirname "$0")/.."

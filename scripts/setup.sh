@@ -1,9 +1,9 @@
-# Shared by demo.sh and test.sh (sourced, POSIX sh): brings a machine to the point where cargo can build and camsim finds a
-# graphics adapter. Says what it does, and does nothing where nothing is missing.
+# Sourced by demo.sh and test.sh (POSIX sh). setup() checks for cargo, a C linker and a Vulkan driver; on Linux with apt it installs
+# the linker and the driver if they are missing. It prints each thing that it installs.
 
 say() { printf '%s\n' "camsim: $*" >&2; }
 
-# Runs a command as root: directly, or through sudo. Fails where neither is possible.
+# Runs a command as root, directly or through sudo. Fails if neither is possible.
 as_root() {
     if [ "$(id -u)" -eq 0 ]; then
         "$@"
@@ -40,8 +40,8 @@ has_vulkan_loader() {
     return 1
 }
 
-# A driver manifest alone proves nothing: Mesa installs those of every GPU at once, and a container may have them without a GPU.
-# So a manifest counts if it is of the software driver, or if there is a GPU device for it.
+# Mesa installs the driver manifests of every GPU at once, and a container may have them without a GPU.
+# So a manifest counts if it belongs to the software driver, or if the machine has a GPU device.
 has_vulkan_driver() {
     [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}${VK_ADD_DRIVER_FILES:-}" ] && return 0
     gpu=no

@@ -1,7 +1,7 @@
 #!/bin/sh
-# The whole test suite, from a fresh clone: installs what is missing, then formatting, lints, tests.
-#   CAMSIM_DATA=DIR    also runs the tests on real flights, terrains and calibrations that are not part of the repository
-#   CAMSIM_SKIP_GPU=1  shows the tests that need an adapter as ignored; without it they fail where there is none
+# Installs what is missing, then checks formatting and lints and runs every test; needs only a clone of the repository and Rust.
+#   CAMSIM_DATA=DIR    also runs the tests on real flights, terrains and calibrations, which are not in the repository
+#   CAMSIM_SKIP_GPU=1  ignores the tests that need a graphics adapter; without it they fail on a machine that has none
 set -eu
 cd "$(dirname "$0")/.."
 . scripts/setup.sh
