@@ -14,7 +14,6 @@ use std::{
 use camsim::{
     core::{
         frame::RenderedFrame,
-        plan::{Planner, line_poses},
         pose::CameraPose,
         scenario::{Channel, ExrCompression, ImageFormat, OutputSpec, TrackerKind, TrackerSpec},
         scene::{Terrain, TerrainDetail},
@@ -25,6 +24,7 @@ use camsim::{
         load::Loaded,
         write::{FrameFiles, FrameWriter},
     },
+    plan::{Planner, line_poses},
 };
 use criterion::{BenchmarkId, Criterion, Throughput};
 use glam::{DQuat, DVec3};

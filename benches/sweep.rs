@@ -12,7 +12,6 @@ use std::{convert::Infallible, path::PathBuf, process::Command, sync::Arc, time:
 use camsim::{
     core::{
         frame::COORDS_CHANNELS,
-        plan::FramePlan,
         scenario::{Auto, Channel, Silhouettes},
         scene::{ModelDetail, SceneLevels},
         sequence::Sequence,
@@ -23,6 +22,7 @@ use camsim::{
         cases::cases,
         timing::{peak_memory_mb, quantile, quartiles},
     },
+    plan::FramePlan,
 };
 
 mod flight;

@@ -7,4 +7,5 @@ pub use camsim_core as core;
 pub use camsim_gpu as gpu;
 pub use camsim_io as io;
 pub use camsim_lab as lab;
+pub use camsim_plan as plan;
 pub use camsim_viewer as viewer;

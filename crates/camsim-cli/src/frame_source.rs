@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::Planner,
-    reference::{KeyFrame, Oracle, RenderOptions},
+    reference::{Oracle, RenderOptions},
     scenario::Auto,
     scene::LodSelection,
     sequence::Sequence,
@@ -14,6 +13,7 @@ use camsim_gpu::{
     engine::{Finished, FrameTimes, Session},
 };
 use camsim_io::write::WriteError;
+use camsim_plan::Planner;
 
 use crate::failure::{Failure, OrFail};
 
@@ -109,7 +109,7 @@ impl FrameSource for Rays {
     fn render(&mut self, frames: &[u64], sink: &mut Sink<'_>) -> Result<(), Failure> {
         for &frame in frames {
             let plan = self.planner.plan(frame).or_bad_input()?;
-            let options = RenderOptions { key: Some(KeyFrame { pose: plan.key_pose, ideal: plan.ideal }), ..self.options.clone() };
+            let options = RenderOptions { key: Some(plan.ideal_view()), ..self.options.clone() };
             let frame = self.oracle.render(frame, &options);
             sink(Finished { frame, plan, lod: LodSelection::default(), out_of_order: 0, times: FrameTimes::default() }).or_failed()?;
         }

@@ -1,9 +1,7 @@
 //! Which frames of a run do not keep the tolerances, by their plans, or may not for what no plan knows.
 
-use camsim_core::{
-    plan::FramePlan,
-    scenario::{Auto, Preset, QualitySpec, Solver},
-};
+use camsim_core::scenario::{Auto, Preset, QualitySpec, Solver};
+use camsim_plan::FramePlan;
 
 /// Frames so far of which `quality.max_error_px` and `quality.max_error_dn` are predicted to be broken.
 #[derive(Debug)]

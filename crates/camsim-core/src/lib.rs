@@ -45,8 +45,6 @@ pub mod scene;
 
 pub mod sequence;
 
-pub mod plan;
-
 pub mod temporal;
 
 pub mod photometric;
@@ -59,6 +57,8 @@ pub mod frame;
 
 pub mod metrics;
 
-mod silhouette;
+pub mod silhouette;
 
 pub mod reference;
+
+pub mod waves;

@@ -33,11 +33,11 @@ use clock::Clock;
 use eye::Eye;
 use ground::Ground;
 pub use holes::{Holes, holes};
-pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, coord_errors, image_errors, silhouettes};
+pub use measure::{CoordErrors, CoordTruth, ErrorStats, ImageErrors, Judged, MOST_VOID_SHARE, coord_errors, image_errors, silhouettes};
 use meshes::Meshes;
 use paint::Paint;
 use ray::Ray;
-pub use render::{Convergence, KeyFrame, RenderOptions};
+pub use render::{Convergence, IdealView, RenderOptions};
 pub use truth::{DEPTH_TOLERANCE, TruthErrors, truth_errors};
 
 /// Zoomed lenses that are kept: as many as frames may be looked at in turn.

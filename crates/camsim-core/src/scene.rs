@@ -6,7 +6,7 @@
 use crate::pose::CameraPose;
 
 pub mod board;
-pub(crate) mod box_tree;
+pub mod box_tree;
 pub mod crossings;
 pub mod levels;
 pub mod light;
@@ -14,7 +14,8 @@ pub mod mesh;
 pub mod paint_order;
 pub mod picture_tiles;
 mod quad;
-pub(crate) mod ray_tree;
+pub mod ray_tree;
+pub mod surface_filter;
 pub mod terrain;
 pub mod texture;
 
@@ -24,6 +25,7 @@ pub use levels::{LevelTolerance, ModelDetail, SceneLevels, ShapeLevel, ShapeLeve
 pub use light::{Light, turned_normal};
 pub use mesh::{Material, Mesh, MeshVertex, Shape};
 pub use picture_tiles::{TILE_SIDE, TILE_TEXELS, TileGrid, TileSource, WHOLE_BYTES, is_whole, tile_bytes};
+pub use surface_filter::{SurfaceFilter, SurfaceReads};
 pub use terrain::{
     Aabb, CHUNK_CELLS, DrawnCell, GroundTiles, LodSelection, PlacedMesh, Terrain, TerrainChunk, TerrainDetail, TerrainError, TerrainGrid,
     TerrainHit, TerrainMesh, TerrainVertex, VERTEX_BITS,

@@ -6,26 +6,26 @@
 //! such a fold from a step and casts rays of its own there.
 
 /// Second difference of inverse depth from pixel to pixel, relative to the nearest, beyond which a bend counts: that of the renderer's marks.
-pub(crate) use crate::temporal::marks::EDGE_STEP as FOLD;
+pub use crate::temporal::marks::EDGE_STEP as FOLD;
 /// Relative change of inverse depth.
-pub(crate) const STEP: f64 = 0.005;
+pub const STEP: f64 = 0.005;
 /// Distance from a silhouette within which a pixel counts as "at" it, output pixels.
-pub(crate) const NEAR_PX: u32 = 3;
+pub const NEAR_PX: u32 = 3;
 /// Times that the two rays' distance is halved.
 const HALVINGS: u32 = 8;
 
 /// Whether inverse depths at three even places may have a step between them: over a plane they lie on a straight line. Saves most looks.
-pub(crate) fn may_step(inverse_depths: [f64; 3]) -> bool {
+pub fn may_step(inverse_depths: [f64; 3]) -> bool {
     bends(inverse_depths, STEP)
 }
 
 /// Whether inverse depths at three even places bend by more than a share of the nearest one.
-pub(crate) fn bends([a, b, c]: [f64; 3], share: f64) -> bool {
+pub fn bends([a, b, c]: [f64; 3], share: f64) -> bool {
     (a - 2.0 * b + c).abs() > share * a.max(b).max(c)
 }
 
 /// Whether there is a step between two rays with the given inverse depths, 0 for the sky. `between` is that of the ray at a share of the way.
-pub(crate) fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
+pub fn steps(from: f64, to: f64, between: impl Fn(f64) -> f64) -> bool {
     let differ = |a: f64, b: f64| (a - b).abs() > STEP * a.max(b);
     let (mut before, mut after) = ((0.0, from), (1.0, to));
     for _ in 0..HALVINGS {

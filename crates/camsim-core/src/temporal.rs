@@ -5,7 +5,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::plan::{NodeDepths, PathStage};
+use crate::camera::CameraModel;
 
 pub mod displacement;
 pub mod edges;
@@ -16,11 +16,15 @@ pub mod marks;
 pub mod paper;
 pub mod path;
 mod samples;
+mod stages;
 pub mod suspects;
 
-pub(crate) use footprint::TENT_PX2;
-pub use footprint::{Footprint, Kernel, TapStage, WIDEST_AREA_PX, tap_shares};
+pub use footprint::{Footprint, Kernel, TENT_PX2, TapStage, WIDEST_AREA_PX, tap_shares};
 pub use samples::{SAMPLE_PLACES, SAMPLES, middle_depth};
+pub use stages::{NodeDepths, PathStage};
+
+/// Most ideal frames of one output frame.
+pub const MAX_KEYS: u32 = 4;
 
 /// The ideal frame's geometry: pixels of a pinhole camera at the key instant, off-axis and only as large as needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +38,21 @@ pub struct IdealGeometry {
 }
 
 impl IdealGeometry {
+    /// How many of its pixels are as long as one of a camera's, where that one's lens leaves it as it is.
+    #[must_use]
+    pub fn scale(&self, camera: &CameraModel) -> f64 {
+        self.focal_px.x / camera.focal_px.x
+    }
+
+    /// `[u_min, u_max, v_min, v_max]` of the pixel area.
+    #[must_use]
+    pub fn tangents(&self) -> [f64; 4] {
+        let size = DVec2::new(f64::from(self.size_px[0]), f64::from(self.size_px[1]));
+        let low = (DVec2::splat(-0.5) - self.principal_px) / self.focal_px;
+        let high = (size - 0.5 - self.principal_px) / self.focal_px;
+        [low.x, high.x, low.y, high.y]
+    }
+
     /// Pixel of a direction given in key-camera coordinates (any positive scale).
     #[must_use]
     pub fn px_from_point(&self, in_key: DVec3) -> DVec2 {
@@ -97,7 +116,7 @@ impl InverseDepthImage<'_> {
 
 /// What is read between four texels (top left, top right, bottom left, bottom right) at the share `t` of the way right and down.
 #[must_use]
-pub(crate) fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
+pub fn blend_inverse_depths([d00, d10, d01, d11]: [f64; 4], t: DVec2) -> f64 {
     let low = d00.min(d10).min(d01).min(d11);
     let high = d00.max(d10).max(d01).max(d11);
     if low > 0.9 * high {
@@ -139,9 +158,9 @@ pub struct KeyView<'a> {
     pub ideal: &'a IdealGeometry,
     /// Its depth.
     pub depth: &'a InverseDepthImage<'a>,
-    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m ([`crate::plan::SeenPlane`]). 0: infinitely far.
+    /// The plane that they begin with: its inverse planar depth is the product with (u, v, 1), 1/m (the plan's `SeenPlane`). 0: infinitely far.
     pub plane: DVec3,
-    /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0: [`crate::plan::FramePlan::sky_reach_px`].
+    /// [`SKY_REACH_PX`] in pixels of the ideal frame, or 0: the plan's `sky_reach_px`.
     pub sky_reach_px: f64,
 }
 
@@ -214,7 +233,7 @@ pub fn reproject_nodes(
 }
 
 /// The parabola through what there is at the shares 0, 1/2 and 1.
-pub(crate) fn through_three([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
+pub fn through_three([begin, middle, end]: [f64; 3]) -> impl Fn(f64) -> f64 {
     let slope = 4.0 * middle - 3.0 * begin - end;
     let bend = 2.0 * begin + 2.0 * end - 4.0 * middle;
     move |share| begin + share * (slope + share * bend)
@@ -262,7 +281,7 @@ fn source_at(uv: DVec2, key_from_line: (DMat3, DVec3), w: f64, ideal: &IdealGeom
 
 /// The inverse depth of a plane on the line's ray, 1/m: `n . z (R d + w t) = 1` gives `w = n . R d / (1 - n . t)`. 0 beyond its horizon and where the line's camera
 /// is not before it.
-pub(crate) fn plane_on_line(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
+pub fn plane_on_line(direction: DVec3, shift: DVec3, plane: DVec3) -> f64 {
     let before = 1.0 - plane.dot(shift);
     if before > 1e-3 { plane.dot(direction).max(0.0) / before } else { 0.0 }
 }

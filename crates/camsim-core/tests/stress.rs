@@ -3,10 +3,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+use camsim_core::temporal::PathStage;
 use camsim_core::{
     apply::{IdealFrame, Motion, Pipeline, Settings},
     camera::CameraModel,
-    plan::PathStage,
     scenario::{CameraSpec, ShutterSpec, Solver},
     shutter::Shutter,
     temporal::{ColorImage, Footprint, IdealGeometry, InverseDepthImage, Kernel, KeyView, displacement::Twist, gather, reproject},

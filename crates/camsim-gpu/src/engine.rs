@@ -20,12 +20,8 @@ use crate::{
     staging::Staging,
     upload::SceneBuffers,
 };
-use camsim_core::{
-    plan::{EdgeStage, FramePlan, Planner, RayStage},
-    scenario::Channel,
-    scene::LodSelection,
-    sequence::Sequence,
-};
+use camsim_core::{scenario::Channel, scene::LodSelection, sequence::Sequence};
+use camsim_plan::{EdgeStage, FramePlan, Planner, RayStage};
 
 mod ahead;
 mod drawn;

@@ -3,12 +3,12 @@
 use std::{collections::HashMap, ops::Range};
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX},
     pose::CameraPose,
     scenario::Preset,
     scene::{LevelTolerance, PlacedMesh, Scene},
     temporal::IdealGeometry,
 };
+use camsim_plan::{EdgeStage, FramePlan, NEAR_M, SIZE_QUANTUM_PX};
 use glam::{DMat3, DVec3};
 
 use crate::{

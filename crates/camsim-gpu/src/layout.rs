@@ -1,7 +1,8 @@
 //! `repr(C)` mirrors of the shader structs; a test compares their offsets with naga's reflection.
 
 use bytemuck::{Pod, Zeroable};
-use camsim_core::{plan::MAX_KEYS, scene::MeshVertex};
+use camsim_core::scene::MeshVertex;
+use camsim_plan::MAX_KEYS;
 
 /// Mirror of `Frame` in shaders/common/frame.wgsl.
 #[repr(C)]
@@ -214,7 +215,7 @@ mod tests {
         );
         assert_mirror!(&module, "Truth", Truth, [uv, source_px, point_ned_m, depth_m]);
         let module = parse(
-            shaders::compose("ideal/terrain.wgsl", &crate::ideal::ground_slots(camsim_core::plan::SurfaceReads::Grid, true, true)).unwrap(),
+            shaders::compose("ideal/terrain.wgsl", &crate::ideal::ground_slots(camsim_plan::SurfaceReads::Grid, true, true)).unwrap(),
         );
         assert_mirror!(
             &module,
@@ -234,7 +235,7 @@ mod tests {
                 pad2,
             ]
         );
-        let slots = crate::ideal::mesh_slots(camsim_core::plan::SurfaceReads::Grid, 1, false, true);
+        let slots = crate::ideal::mesh_slots(camsim_plan::SurfaceReads::Grid, 1, false, true);
         let module = parse(shaders::compose("ideal/mesh.wgsl", &slots).unwrap());
         assert_mirror!(&module, "MeshPlacement", MeshPlacement, [x, y, z]);
         assert_mirror!(&module, "MeshMaterial", MeshMaterial, [emissive_cutoff, sun_sky]);

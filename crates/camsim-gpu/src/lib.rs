@@ -2,7 +2,7 @@
 //!
 //! Modules in the order of the data flow: context (adapter and device) -> shaders (WGSL composition) -> layout (mirrors of shader
 //! structs) -> scene upload -> staging and recorder (a frame's writes and commands) -> ideal frame -> reverse pipeline -> engine (frames in flight, read-back).
-//! The engine executes [`camsim_core::plan::FramePlan`]s and decides nothing itself.
+//! The engine executes [`camsim_plan::FramePlan`]s and decides nothing itself.
 
 #![warn(missing_docs)]
 

@@ -7,11 +7,11 @@ use std::collections::{HashMap, hash_map::Entry};
 
 use camsim_core::{
     photometric::is_mono,
-    plan::{EdgeStage, FramePlan, LinearFog, MAX_KEYS, NEAR_M, RayStage, TemporalStage, table_shape},
     scenario::Scenario,
     shutter::LinesAxis,
     temporal::{TapStage, displacement::RK2_STEP_DEG},
 };
+use camsim_plan::{EdgeStage, FramePlan, LinearFog, MAX_KEYS, NEAR_M, RayStage, TemporalStage, table_shape};
 use glam::DMat3;
 
 use crate::{

@@ -44,7 +44,7 @@ fn hills() -> Scene {
 
 fn errors(sequence: &Arc<Sequence>, done: &Finished) -> TruthErrors {
     let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-    truth_errors(&oracle, &done.plan, &done.frame, NEAR_PX).expect("depth of the sequence's size")
+    truth_errors(&oracle, done.plan.frame, &done.frame, NEAR_PX).expect("depth of the sequence's size")
 }
 
 #[test]

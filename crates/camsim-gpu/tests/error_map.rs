@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use camsim_core::{
     noise::pcg4d,
-    plan::{ErrorMap, FramePlan, Planner, TemporalStage},
-    reference::{KeyFrame, Oracle},
+    reference::Oracle,
     scenario::{Auto, Axis, Channel, LensModel, LensSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
 };
+use camsim_plan::{ErrorMap, FramePlan, Planner, TemporalStage};
 use common::{city, engine, pattern, render, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
@@ -148,7 +148,7 @@ fn pixels_are_off_by_no_more_than_the_places_around_them_say() {
         let map = planner.error_map(&done.plan).expect("a map");
         let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
         let view = oracle.view(0);
-        let key = KeyFrame { pose: done.plan.key_pose, ideal: done.plan.ideal };
+        let key = done.plan.ideal_view();
         let coords = done.frame.coords.as_ref().expect("asked for");
         let (mut within, mut all, mut apart, mut least_px, mut most_px) = (0, 0, 0, f64::INFINITY, 0.0_f64);
         for i in 0..PIXELS {

@@ -7,13 +7,13 @@ mod common;
 
 use camsim_core::{
     mount::CameraPath,
-    plan::{FramePlan, TemporalStage},
     scenario::{
         Auto, Axis, CameraSpec, Channel, FieldOr, LensModel, LensSpec, MountSpec, Readout, Scenario, ShutterSpec, Solver, VibrationSpec,
     },
     scene::Wrap,
     trajectory::Trajectory,
 };
+use camsim_plan::{FramePlan, TemporalStage};
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 

@@ -5,7 +5,6 @@ mod common;
 use std::{collections::HashSet, convert::Infallible, path::Path, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, SurfaceReads},
     scenario::{Auto, Channel, MountSpec, Scenario, Silhouettes},
     scene::{Encoding, Light, Mesh, MeshVertex, Scene, Shape, Texture, Wrap},
     sequence::Sequence,
@@ -16,6 +15,7 @@ use camsim_gpu::{
     reverse::host::ReverseOn,
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
+use camsim_plan::{FramePlan, SurfaceReads};
 use common::{city, engine, is_software, pattern, scenario, sequence, steady};
 use glam::{DMat3, DQuat, DVec3};
 

@@ -6,12 +6,12 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     frame::RenderedFrame,
-    plan::EdgeStage,
     reference::{Oracle, RenderOptions, coord_errors, holes, image_errors, silhouettes},
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec},
     sequence::Sequence,
     temporal::edges::{KeyView, Keys, gather_edges},
 };
+use camsim_plan::EdgeStage;
 use common::{
     city, engine, pattern,
     rays::{CastFrame, black_ground_and_roof, expected, linear_psnr, roof},
@@ -162,8 +162,9 @@ fn every_pixel_over_buildings_has_the_source_and_depth_of_what_it_sees() {
             let sequence = Arc::new(sequence);
             let done = render_at_phase(&engine, &sequence, &ALL, 0, phase as f32);
             let oracle = Oracle::new(sequence).expect("a usable camera");
-            let errors = coord_errors(&oracle, &done.plan, &done.frame, phase, 1).expect("coords were asked for");
-            unseen += holes(&oracle, &done.plan, &[phase]).unseen;
+            let errors =
+                coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1).expect("coords were asked for");
+            unseen += holes(&oracle, done.plan.frame, &done.plan.key_poses(), &[phase]).unseen;
             let depth_off = worst_depth(&oracle, &done.frame);
             eprintln!(
                 "{name}: {} keys, rms {:.1e} px, at silhouettes {:.1e} px, max {:.1e} px, depth {depth_off:.1e}",

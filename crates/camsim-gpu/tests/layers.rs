@@ -5,13 +5,13 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::FramePlan,
     reference::{Oracle, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Preset},
     scene::{Encoding, Light, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
 };
 use camsim_io::gltf_file::{GltfOptions, read_gltf};
+use camsim_plan::FramePlan;
 use common::{engine, pattern, render, scenario, sequence, steady};
 use glam::{DMat3, DVec3};
 

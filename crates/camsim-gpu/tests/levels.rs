@@ -8,12 +8,12 @@ mod common;
 use std::{f64::consts::FRAC_PI_2, sync::Arc};
 
 use camsim_core::{
-    plan::Planner,
     pose::CameraPose,
     reference::{Oracle, RenderOptions},
     scenario::{Auto, Channel, MountSpec},
     scene::{Encoding, Light, Mesh, MeshVertex, ModelDetail, Scene, SceneLevels, Shape, Texture, Wrap},
 };
+use camsim_plan::Planner;
 use common::{engine, render, scenario, sequence, steady};
 use glam::{DMat3, DVec2, DVec3};
 

@@ -5,7 +5,6 @@ mod common;
 use std::{collections::HashSet, convert::Infallible, fmt::Debug, hash::Hash, path::Path, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, NodeDepths, PathStage, RayStage},
     scenario::{
         Auto, Axis, Channel, FieldOr, LensModel, LensSpec, MountSpec, OutputEncoding, Readout, Scenario, ShutterSpec, Silhouettes,
         VibrationSpec,
@@ -23,6 +22,7 @@ use camsim_gpu::{
     },
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
+use camsim_plan::{FramePlan, NodeDepths, PathStage, RayStage};
 use common::{city, engine, is_software, pattern, scenario, sequence, steady};
 use glam::DVec3;
 

@@ -4,7 +4,6 @@ mod common;
 
 use camsim_core::{
     lens::paper::gauss_newton,
-    plan::{EdgeStage, RayStage, TemporalStage, line_times},
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Preset, Scenario, ShutterSpec},
     scene::srgb_from_linear,
     temporal::{
@@ -13,6 +12,7 @@ use camsim_core::{
         paper::{gather_straight, linear_fog},
     },
 };
+use camsim_plan::{EdgeStage, RayStage, TemporalStage, line_times};
 use common::{engine, pattern, render, render_with_ideal, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 

@@ -12,12 +12,12 @@ use std::{
 };
 
 use camsim_core::{
-    plan::Planner,
     scenario::{Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, ZoomSpec},
     scene::{Scene, Terrain},
     sequence::Sequence,
 };
 use camsim_gpu::{Engine, RenderError, engine::Finished};
+use camsim_plan::Planner;
 use common::{city, engine, pattern, scenario, sequence, steady};
 use glam::DVec3;
 

@@ -9,7 +9,6 @@ use std::{convert::Infallible, sync::Arc, time::Instant};
 
 use camsim_core::{
     noise::pcg4d,
-    plan::{FramePlan, TemporalStage},
     reference::{CoordErrors, Oracle, coord_errors},
     scenario::{Auto, Axis, Channel, FieldOr, LensModel, LensSpec, Readout, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Encoding, Mesh, MeshVertex, Scene, Terrain, Texture, Wrap},
@@ -17,6 +16,7 @@ use camsim_core::{
     trajectory::Trajectory,
 };
 use camsim_gpu::{Engine, engine::Finished};
+use camsim_plan::{FramePlan, TemporalStage};
 use common::{engine, pattern, scenario, sequence, steady};
 use glam::DVec3;
 
@@ -149,7 +149,8 @@ fn find(engine: &Engine, sequence: &Arc<Sequence>) -> Found {
     for phase in phases {
         session.set_coords_phase(phase);
         let mut sink = |done: Finished| {
-            let errors = coord_errors(&oracle, &done.plan, &done.frame, f64::from(phase), 1).expect("coords were asked for");
+            let errors = coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, f64::from(phase), 1)
+                .expect("coords were asked for");
             if worst.is_none_or(|worst| errors.smooth.p99_px > worst.smooth.p99_px) {
                 worst = Some(errors);
             }

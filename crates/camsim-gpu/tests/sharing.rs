@@ -6,7 +6,6 @@ use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
     mount::CameraPath,
-    plan::{FramePlan, PlanError, Planner, TemporalStage},
     pose::BodyState,
     reference::{Oracle, coord_errors},
     scenario::{Axis, Channel, LensModel, LensSpec, MountSpec, ShutterSpec, VibrationSpec},
@@ -14,6 +13,7 @@ use camsim_core::{
     trajectory::Trajectory,
 };
 use camsim_gpu::{Engine, engine::Finished};
+use camsim_plan::{FramePlan, PlanError, Planner, TemporalStage};
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
 use glam::{DQuat, DVec3};
 
@@ -78,7 +78,8 @@ fn a_group_is_drawn_once_and_every_frame_of_it_is_right() {
                 let done = render_at_phase(&engine, &sequence, &ALL, frame, phase);
                 assert!(done.frame.color_rgba == first.frame.color_rgba, "{name}, {frame}: asking for the truth changes no colour");
                 let oracle = Oracle::new(sequence.clone()).expect("a usable camera");
-                let errors = coord_errors(&oracle, &done.plan, &done.frame, f64::from(phase), 1).expect("coords were asked for");
+                let errors = coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, f64::from(phase), 1)
+                    .expect("coords were asked for");
                 let p99_px = errors.all.p99_px;
                 assert!(errors.falsely_valid == 0 && errors.missing == 0 && errors.all.count > 19_000, "{name}, {frame}: {errors:?}");
                 assert!(p99_px <= done.plan.predicted.total_px && done.plan.predicted.kept, "{name}, {frame}: {errors:?}");

@@ -3,7 +3,6 @@
 mod common;
 
 use camsim_core::{
-    plan::EdgeStage,
     reference::Oracle,
     scenario::{Auto, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Scene, Terrain},
@@ -15,6 +14,7 @@ use camsim_core::{
     trajectory::Trajectory,
 };
 use camsim_gpu::engine::Finished;
+use camsim_plan::EdgeStage;
 use common::{
     engine, pattern,
     rays::{CastFrame, black_ground_and_roof, expected, linear_psnr, roof},

@@ -5,7 +5,6 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::TemporalStage,
     reference::{Oracle, RenderOptions},
     scenario::{Auto, Channel, MountSpec, Scenario, ShutterSpec, Silhouettes, Solver},
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
@@ -13,6 +12,7 @@ use camsim_core::{
     temporal::{ColorImage, InverseDepthImage, KeyView, SKY_REACH_PX, reproject},
 };
 use camsim_gpu::reverse::host::ReverseOn;
+use camsim_plan::TemporalStage;
 use common::{engine, scenario, sequence, steady};
 use glam::{DMat3, DVec2, DVec3};
 

@@ -5,7 +5,6 @@ mod common;
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::{TemporalStage, line_times},
     reference::{CoordErrors, Oracle, coord_errors},
     scenario::{Auto, Axis, Channel, LensModel, LensSpec, MountSpec, Scenario, ShutterSpec, Solver, VibrationSpec},
     scene::{Scene, Terrain},
@@ -15,6 +14,7 @@ use camsim_core::{
         displacement::{RK2_STEP_DEG, linear, rk2, rk2_steps},
     },
 };
+use camsim_plan::{TemporalStage, line_times};
 use common::{engine, pattern, render, render_with_ideal, scenario, sequence, steady};
 use glam::{DVec2, DVec3};
 
@@ -148,7 +148,7 @@ fn errors_against_rays_cast_into_the_scene() {
                 assert_eq!(done.plan.temporal, TemporalStage::Reproject { iterations });
             }
             let oracle = Oracle::new(sequence).expect("a camera");
-            let errors: CoordErrors = coord_errors(&oracle, &done.plan, &done.frame, 0.0, 1).expect("coords");
+            let errors: CoordErrors = coord_errors(&oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, 0.0, 1).expect("coords");
             let all = errors.all;
             eprintln!("{:26} {name:13} RMS {:.2e} p99 {:.2e} max {:.2e} px", case.name, all.rms_px, all.p99_px, all.max_px);
             assert!(all.count > 19_000 && errors.missing == 0 && errors.falsely_valid == 0, "{errors:?}");

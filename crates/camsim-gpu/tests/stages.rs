@@ -7,7 +7,6 @@ use std::{convert::Infallible, sync::Arc};
 use camsim_core::{
     noise::tail_table,
     photometric::{photometric, vignette_weights},
-    plan::{BlurStage, NodeDepths, RayStage, TemporalStage, line_poses},
     scenario::{
         Auto, Axis, Channel, LensModel, LensSpec, MountSpec, OutputEncoding, Scenario, ShutterSpec, Solver, VibrationSpec, ZoomSpec,
     },
@@ -17,6 +16,7 @@ use camsim_core::{
         reproject_with,
     },
 };
+use camsim_plan::{BlurStage, NodeDepths, RayStage, TemporalStage, line_poses};
 use common::{engine, pattern, render, scenario, sequence, steady};
 use glam::{DMat3, DVec2, DVec3};
 

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use camsim_core::{
     mount::CameraPath,
-    plan::{FramePlan, TemporalStage},
     pose::BodyState,
     scenario::{Axis, Channel, MountSpec, Scenario, ShutterSpec, VibrationSpec},
     scene::{Mesh, MeshVertex, Scene, Wrap},
@@ -15,6 +14,7 @@ use camsim_core::{
     trajectory::Trajectory,
 };
 use camsim_gpu::engine::Finished;
+use camsim_plan::{FramePlan, TemporalStage};
 use common::{engine, pattern, render_at_phase, scenario, sequence, steady};
 use glam::{DQuat, DVec2, DVec3, EulerRot};
 

@@ -5,12 +5,12 @@ mod common;
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    plan::SurfaceReads,
     scenario::{Channel, MountSpec, Scenario},
     scene::{Encoding, Scene, Terrain, Texture},
     sequence::Sequence,
 };
 use camsim_gpu::engine::IdealImages;
+use camsim_plan::SurfaceReads;
 use common::{engine, is_software, scenario, sequence, steady};
 use glam::DVec3;
 

@@ -3,8 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use camsim_core::{
-    plan::Planner,
-    reference::{KeyFrame, Oracle, RenderOptions},
+    reference::{IdealView, Oracle, RenderOptions},
     scenario::Channel,
 };
 use camsim_io::{
@@ -13,6 +12,7 @@ use camsim_io::{
     scenario_file::read_scenario,
     write::SourceFrame,
 };
+use camsim_plan::Planner;
 use glam::{DQuat, DVec2, DVec3};
 
 const SIZE_PX: [u32; 2] = [64, 48];
@@ -38,7 +38,7 @@ fn coordinates_are_pixels_of_the_frame_that_the_table_describes() {
     let planner = Planner::new(sequence.clone(), &CHANNELS, 16_384).unwrap();
     let oracle = Oracle::new(sequence.clone()).unwrap();
     let plan = planner.plan(7).unwrap();
-    let key = Some(KeyFrame { pose: plan.key_pose, ideal: plan.ideal });
+    let key = Some(IdealView { pose: plan.key_pose, ideal: plan.ideal });
     let options = RenderOptions { channels: CHANNELS.to_vec(), key, max_samples: 1, ..RenderOptions::default() };
     let frame = oracle.render(7, &options);
     let source = SourceFrame::new(&plan, sequence.epoch_ns);

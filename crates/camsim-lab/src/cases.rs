@@ -388,10 +388,8 @@ pub fn sequence(camera: CameraSpec, trajectory: Trajectory, scene: Scene) -> Res
 mod tests {
     use std::collections::HashSet;
 
-    use camsim_core::{
-        plan::{EdgeStage, Planner},
-        scenario::Channel,
-    };
+    use camsim_core::scenario::Channel;
+    use camsim_plan::{EdgeStage, Planner};
 
     use super::*;
 

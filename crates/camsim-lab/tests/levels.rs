@@ -5,7 +5,6 @@
 use std::{convert::Infallible, sync::Arc};
 
 use camsim_core::{
-    plan::{EdgeStage, FramePlan, Planner},
     scenario::{Auto, Channel, QualitySpec, Silhouettes, Solver},
     sequence::Sequence,
 };
@@ -14,6 +13,7 @@ use camsim_lab::{
     bench::{knobs::resize, rounds::FRAME, truth::Truth},
     cases::cases,
 };
+use camsim_plan::{EdgeStage, FramePlan, Planner};
 
 /// Measured error may be above the predicted one by this much: 32 places stand for the picture, and 4000 of its pixels are measured.
 const ABOVE: f64 = 1.15;

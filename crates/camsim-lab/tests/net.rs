@@ -14,7 +14,7 @@ mod subjects;
 
 use std::{collections::BTreeMap, io::Write, sync::LazyLock};
 
-use camsim_core::plan::{FramePlan, PlanError};
+use camsim_plan::{FramePlan, PlanError};
 use pictures::Checksums;
 use serde_json::{Map, Value, json};
 use subjects::Subject;

@@ -2,8 +2,9 @@
 
 use std::{sync::Arc, time::Instant};
 
-use camsim_core::{flight_log::FlightLog, plan::FramePlan, reference::Oracle, sequence::Sequence};
+use camsim_core::{flight_log::FlightLog, reference::Oracle, sequence::Sequence};
 use camsim_io::load::Loaded;
+use camsim_plan::FramePlan;
 use eframe::egui;
 
 use crate::{

@@ -1,7 +1,6 @@
 //! `camsim explain`: what one frame takes, without rendering it.
 
 use camsim_core::{
-    plan::{FramePlan, PlanSummary, Planner},
     scenario::{Auto, LightSpec, Solver},
     scene::{self, GroundTiles, ModelDetail, SceneLevels, TerrainDetail, TexelForm, tile_bytes},
     sequence::Sequence,
@@ -12,6 +11,7 @@ use camsim_gpu::{
     reverse::host::{self, ReverseOn},
 };
 use camsim_io::{load::Loaded, terrain::TerrainSummary, write::SourceFrame};
+use camsim_plan::{FramePlan, PlanSummary, Planner};
 use serde::Serialize;
 
 use crate::{

@@ -4,9 +4,8 @@ use std::convert::Infallible;
 
 use anyhow::anyhow;
 use camsim_core::{
-    plan::{FramePlan, Predicted},
     reference::{
-        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, Judged, KeyFrame, Oracle, RenderOptions, TruthErrors, coord_errors, holes,
+        CoordErrors, DEPTH_TOLERANCE, ErrorStats, Holes, IdealView, Judged, Oracle, RenderOptions, TruthErrors, coord_errors, holes,
         image_errors, silhouettes, truth_errors,
     },
     scenario::{Auto, Channel, Solver},
@@ -15,6 +14,7 @@ use camsim_gpu::{
     AdapterChoice, Engine,
     engine::{Finished, Session},
 };
+use camsim_plan::{FramePlan, Predicted};
 use serde::Serialize;
 
 use super::explain::{LevelOfDetail, level_of_detail};
@@ -277,7 +277,7 @@ fn verify(frame: u64, session: &mut Session<'_>, oracle: &Oracle, tolerance_px: 
     let picture = pictures.then(|| picture(oracle, &first));
     let hole_share = unseen(oracle, &first.plan).share();
     let is_exact = first.plan.tells_exact_truth();
-    let truth = truth_errors(oracle, &first.plan, &first.frame, tolerance_px).filter(|_| is_exact).map(Truth::from);
+    let truth = truth_errors(oracle, first.plan.frame, &first.frame, tolerance_px).filter(|_| is_exact).map(Truth::from);
     Ok(Verified {
         frame,
         level_of_detail: level_of_detail(oracle.sequence(), &first.plan),
@@ -315,7 +315,7 @@ fn phases(plan: &FramePlan) -> Vec<f32> {
 /// Over the exposure, if it shows: its middle and both ends, as the probes of the plan look.
 fn unseen(oracle: &Oracle, plan: &FramePlan) -> Holes {
     let phases: &[f64] = if plan.blur.is_some() { &[-0.5, 0.0, 0.5] } else { &[0.0] };
-    holes(oracle, plan, phases)
+    holes(oracle, plan.frame, &plan.key_poses(), phases)
 }
 
 fn at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finished, Failure> {
@@ -329,12 +329,12 @@ fn at_phase(session: &mut Session<'_>, frame: u64, phase: f32) -> Result<Finishe
 }
 
 fn measure(oracle: &Oracle, done: &Finished, phase: f64) -> Result<CoordErrors, Failure> {
-    coord_errors(oracle, &done.plan, &done.frame, phase, 1)
+    coord_errors(oracle, done.plan.frame, &done.plan.ideal_view(), &done.frame, phase, 1)
         .ok_or_else(|| Failure::failed(anyhow!("frame {} has no source coordinates", done.plan.frame)))
 }
 
 fn picture(oracle: &Oracle, done: &Finished) -> Picture {
-    let key = KeyFrame { pose: done.plan.key_pose, ideal: done.plan.ideal };
+    let key = IdealView { pose: done.plan.key_pose, ideal: done.plan.ideal };
     let truth = oracle.render(done.plan.frame, &RenderOptions { key: Some(key), ..RenderOptions::default() });
     let near = silhouettes(oracle, done.plan.frame, &[-0.5, 0.0, 0.5]);
     let finite = |db: f64| db.is_finite().then_some(db);

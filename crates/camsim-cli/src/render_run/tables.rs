@@ -3,14 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::anyhow;
-use camsim_core::{
-    mount::CameraPath,
-    plan::{FramePlan, Planner},
-    scenario::Scenario,
-    sequence::Sequence,
-    shutter::Shutter,
-    trajectory::Trajectory,
-};
+use camsim_core::{mount::CameraPath, scenario::Scenario, sequence::Sequence, shutter::Shutter, trajectory::Trajectory};
 use camsim_io::{
     portable::write_camera,
     write::{
@@ -18,6 +11,7 @@ use camsim_io::{
         trajectory_csv, write_atomic,
     },
 };
+use camsim_plan::{FramePlan, Planner};
 
 use super::Job;
 use crate::{

@@ -1,10 +1,10 @@
-//! What the ideal frames of a plan do not see.
+//! What ideal frames do not see.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
 use super::Oracle;
-use crate::plan::FramePlan;
+use crate::pose::CameraPose;
 
 /// Rays of a frame, and those of them whose points something hides from every camera of an ideal frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,16 +23,16 @@ impl Holes {
     }
 }
 
-/// Counts them over the centres of all pixels at the exposure phases given (-0.5 to 0.5).
+/// Counts them for ideal frames at the poses `keys`, over the centres of all pixels at the exposure phases given (-0.5 to 0.5).
 #[must_use]
-pub fn holes(oracle: &Oracle, plan: &FramePlan, phases: &[f64]) -> Holes {
+pub fn holes(oracle: &Oracle, frame: u64, keys: &[CameraPose], phases: &[f64]) -> Holes {
     let [width, height] = oracle.sequence.scenario.camera.size_px;
-    let view = oracle.view(plan.frame);
+    let view = oracle.view(frame);
     let of_row = |y: u32| {
         let looks = (0..width).flat_map(|x| phases.iter().map(move |&phase| (x, phase)));
         let mut row = Holes::default();
         for look in looks.filter_map(|(x, phase)| view.look([x, y], DVec2::ZERO, phase)) {
-            let unseen = |point| plan.keys.iter().all(|key| oracle.hides(key.pose.position_ned_m, point));
+            let unseen = |point| keys.iter().all(|key| oracle.hides(key.position_ned_m, point));
             row.rays += 1;
             row.unseen += u64::from(look.hit.is_some_and(|hit| unseen(hit.point_ned_m)));
         }

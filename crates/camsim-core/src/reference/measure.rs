@@ -5,12 +5,14 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::{KeyFrame, Look, Oracle};
+use super::{IdealView, Look, Oracle};
 use crate::{
     frame::RenderedFrame,
-    plan::{FramePlan, MOST_VOID_SHARE},
     silhouette::{FOLD, NEAR_PX, bends, may_step, steps},
 };
+
+/// Largest share of the pixels with a ray but no source in a frame that keeps its tolerance.
+pub const MOST_VOID_SHARE: f64 = 0.01;
 
 /// Share of the compared pixels that must lie away from silhouettes for their 99th percentile to stand for the frame.
 const LEAST_SMOOTH_SHARE: f64 = 0.05;
@@ -137,25 +139,25 @@ impl CoordTruth {
 
     /// As [`coord_errors`], of a rendering of this frame.
     #[must_use]
-    pub fn errors(&self, plan: &FramePlan, frame: &RenderedFrame, step: u32) -> Option<CoordErrors> {
-        compared(&self.oracle, &self.looks, &self.near, plan, frame, step)
+    pub fn errors(&self, ideal: &IdealView, frame: &RenderedFrame, step: u32) -> Option<CoordErrors> {
+        compared(&self.oracle, &self.looks, &self.near, ideal, frame, step)
     }
 }
 
-/// Compares `coords` of a frame, rendered by `plan` at exposure phase `phase`, with the oracle: where the point that the pixel's own ray
-/// meets lies in the ideal frame. Every `step`-th pixel in both directions. A pixel counts as at a silhouette within 3 px of one, and where
+/// Compares `coords` of frame `number`, rendered from the ideal frame `ideal` at exposure phase `phase`, with the oracle: where the point that the
+/// pixel's own ray meets lies in the ideal frame. Every `step`-th pixel in both directions. A pixel counts as at a silhouette within 3 px of one, and where
 /// its true point is hidden from the key camera or behind it. `None` without coords, or if the frame has another size than the sequence's.
 #[must_use]
-pub fn coord_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
-    let looks = looks(oracle, plan.frame, phase);
-    compared(oracle, &looks, &dilated(oracle, &edges(oracle, &looks)), plan, frame, step)
+pub fn coord_errors(oracle: &Oracle, number: u64, ideal: &IdealView, frame: &RenderedFrame, phase: f64, step: u32) -> Option<CoordErrors> {
+    let looks = looks(oracle, number, phase);
+    compared(oracle, &looks, &dilated(oracle, &edges(oracle, &looks)), ideal, frame, step)
 }
 
 fn compared(
     oracle: &Oracle,
     looks: &[Option<Look>],
     near: &[bool],
-    plan: &FramePlan,
+    ideal: &IdealView,
     frame: &RenderedFrame,
     step: u32,
 ) -> Option<CoordErrors> {
@@ -165,7 +167,6 @@ fn compared(
     if frame.size_px != oracle.sequence.scenario.camera.size_px || coords.len() != pixels || frame.color_rgba.len() != 4 * pixels {
         return None;
     }
-    let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
     let compare = |i: usize| {
         let valid = frame.color_rgba[4 * i + 3] > 0.0;
         match (&looks[i], valid) {
@@ -175,8 +176,8 @@ fn compared(
             (Some(look), true) => {
                 let found = DVec2::new(f64::from(coords[i][2]), f64::from(coords[i][3]));
                 let unseen =
-                    key.in_key(look).z <= 0.0 || look.hit.is_some_and(|hit| oracle.hides(key.pose.position_ned_m, hit.point_ned_m));
-                Compared::Error { px: found.distance(key.source_px(look)), at_silhouette: near[i] || unseen }
+                    ideal.in_key(look).z <= 0.0 || look.hit.is_some_and(|hit| oracle.hides(ideal.pose.position_ned_m, hit.point_ned_m));
+                Compared::Error { px: found.distance(ideal.source_px(look)), at_silhouette: near[i] || unseen }
             }
         }
     };

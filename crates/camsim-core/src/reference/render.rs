@@ -36,7 +36,7 @@ pub struct RenderOptions {
     /// Whether vignette, light, noise and saturation are applied; else the frame holds the light that arrives.
     pub photometric: bool,
     /// The ideal frame that the source coordinates of [`Channel::Coords`] refer to; without one they are 0.
-    pub key: Option<KeyFrame>,
+    pub key: Option<IdealView>,
     /// Pixels that are rendered, row-major; the others are left invalid. `None` is all.
     pub only: Option<Vec<bool>>,
 }
@@ -57,14 +57,14 @@ impl Default for RenderOptions {
 
 /// Pose and geometry of an ideal frame, for source coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeyFrame {
+pub struct IdealView {
     /// Its pose.
     pub pose: CameraPose,
     /// Its pixels.
     pub ideal: IdealGeometry,
 }
 
-impl KeyFrame {
+impl IdealView {
     /// Where what a look sees lies in the ideal frame, pixels: its point, or for the sky its direction. Not finite on the horizon of the
     /// key camera, and mirrored behind it.
     #[must_use]

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{FrameView, Look, Oracle};
-use crate::{frame::RenderedFrame, plan::FramePlan};
+use crate::frame::RenderedFrame;
 
 /// Share of the depth beyond which a depth or a point is wrong.
 pub const DEPTH_TOLERANCE: f64 = 1e-3;
@@ -49,18 +49,18 @@ struct PixelError {
     point_fault: bool,
 }
 
-/// Compares depth, and points where the frame has coordinates, with what the centre of each pixel sees at mid-exposure. Where they differ, surfaces within `near_px` of the centre
+/// Compares depth of frame `number`, and points where the frame has coordinates, with what the centre of each pixel sees at mid-exposure. Where they differ, surfaces within `near_px` of the centre
 /// are looked at too: at an edge that is nearer than this the other side counts as seen. `None` without depth, or if the frame has another size
 /// than the sequence's.
 #[must_use]
-pub fn truth_errors(oracle: &Oracle, plan: &FramePlan, frame: &RenderedFrame, near_px: f64) -> Option<TruthErrors> {
+pub fn truth_errors(oracle: &Oracle, number: u64, frame: &RenderedFrame, near_px: f64) -> Option<TruthErrors> {
     let depth_m = frame.depth_m.as_ref()?;
     let width = frame.size_px[0];
     let pixels = width as usize * frame.size_px[1] as usize;
     if frame.size_px != oracle.sequence.scenario.camera.size_px || depth_m.len() != pixels || frame.color_rgba.len() != 4 * pixels {
         return None;
     }
-    let view = oracle.view(plan.frame);
+    let view = oracle.view(number);
     let error_of = |i: usize| {
         let pixel = [i as u32 % width, i as u32 / width];
         let look = view.look(pixel, DVec2::ZERO, 0.0).filter(|_| frame.color_rgba[4 * i + 3] > 0.0)?;

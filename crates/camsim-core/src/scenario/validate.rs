@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::{Auto, Axis, CameraSpec, FieldOr, LensModel, Origin, Preset, QualitySpec, Scenario, Silhouettes, Solver, Stamps, TrackerSpec};
-use crate::{plan::MAX_KEYS, temporal::SAMPLES};
+use crate::temporal::{MAX_KEYS, SAMPLES};
 
 mod scene;
 

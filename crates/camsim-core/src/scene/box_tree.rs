@@ -7,7 +7,7 @@ const LEAF: usize = 4;
 
 /// Boxes within boxes: what a point is near to, or a box overlaps, is found without a look at everything.
 #[derive(Debug, Default)]
-pub(crate) struct BoxTree {
+pub struct BoxTree {
     nodes: Vec<Node>,
     /// The things, ordered so that those of a leaf follow each other.
     things: Vec<u32>,

@@ -63,7 +63,7 @@ impl Shape {
     }
 
     /// Smallest box around the corners, in the shape's own axes.
-    pub(crate) fn bounds(&self) -> Aabb {
+    pub fn bounds(&self) -> Aabb {
         let mut bounds = Aabb::EMPTY;
         self.vertices.iter().for_each(|vertex| bounds.include(DVec3::from_array(vertex.position_m.map(f64::from))));
         bounds
@@ -103,7 +103,7 @@ impl Material {
     }
 
     /// Alpha at a place of the picture, in f64: what the cut-off is compared with, but for the tint.
-    pub(crate) fn alpha_at(&self, uv: [f64; 2]) -> f64 {
+    pub fn alpha_at(&self, uv: [f64; 2]) -> f64 {
         self.texture.alpha_at(uv, self.wrap, self.nearest)
     }
 }
@@ -174,35 +174,35 @@ impl Mesh {
     }
 
     /// Whether a ray along `direction_ned` that meets a triangle of the shape sees something there: the right side, and no hole.
-    pub(crate) fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
+    pub fn shows(&self, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> bool {
         self.faces(corners, direction_ned) && self.material.cutoff.is_none_or(|cutoff| self.alpha_at(corners, weights) >= f64::from(cutoff))
     }
 
     /// Whether a triangle is there for what looks along a direction.
-    pub(crate) fn faces(&self, corners: [u32; 3], direction_ned: DVec3) -> bool {
+    pub fn faces(&self, corners: [u32; 3], direction_ned: DVec3) -> bool {
         let [a, b, c] = corners.map(|v| self.position_ned_m(v));
         !self.material.one_sided || (b - a).cross(c - a).dot(direction_ned) < 0.0
     }
 
     /// Alpha between three corners.
-    pub(crate) fn alpha_at(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
+    pub fn alpha_at(&self, corners: [u32; 3], weights: [f64; 3]) -> f64 {
         self.material.alpha_at(self.uv_at(corners, weights)) * self.tint_at(corners, weights)[3]
     }
 
     /// Texture coordinates between three corners.
-    pub(crate) fn uv_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 2] {
+    pub fn uv_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 2] {
         let of = corners.map(|v| self.shape.vertices[v as usize].uv);
         [0, 1].map(|axis: usize| (0..3).map(|k| weights[k] * f64::from(of[k][axis])).sum())
     }
 
     /// Tint between three corners.
-    pub(crate) fn tint_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 4] {
+    pub fn tint_at(&self, corners: [u32; 3], weights: [f64; 3]) -> [f64; 4] {
         let of = corners.map(|v| self.shape.vertices[v as usize].tint);
         [0, 1, 2, 3].map(|channel: usize| (0..3).map(|k| weights[k] * f64::from(of[k][channel])).sum())
     }
 
     /// Factor of the picture's colour between three corners, seen along a direction: light on the side that is seen, or 1 without normals.
-    pub(crate) fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
+    pub fn light_at(&self, light: &Light, corners: [u32; 3], weights: [f64; 3], direction_ned: DVec3) -> f64 {
         if !self.shape.has_normals() {
             return 1.0;
         }

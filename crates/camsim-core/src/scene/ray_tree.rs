@@ -15,7 +15,7 @@ const MOST_WAITING: usize = 3 * 17 + 1;
 
 /// Boxes within boxes, four and four together: what a ray meets first is found without a look at everything.
 #[derive(Debug, Default)]
-pub(crate) struct RayTree {
+pub struct RayTree {
     /// All coordinates are relative to it.
     middle: DVec3,
     /// Largest coordinate of a box, metres.

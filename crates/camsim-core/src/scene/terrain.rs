@@ -40,9 +40,9 @@ pub use detail::TerrainDetail;
 use facing::BorderPart;
 pub use ground_tiles::GroundTiles;
 pub use placed::PlacedMesh;
-pub(crate) use query::Frustum;
+pub use query::Frustum;
 pub use query::TerrainHit;
-pub(crate) use query::intersect_triangle;
+pub use query::intersect_triangle;
 pub use select::{DrawnCell, LodSelection, TerrainMesh, VERTEX_BITS};
 use tree::BlockTree;
 
@@ -172,7 +172,7 @@ impl Terrain {
     }
 
     /// Number of chunk that holds cell (column, row) of the full grid, and the cell's place in that chunk.
-    pub(crate) fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
+    pub fn chunk_of_cell(&self, cell: [u32; 2]) -> (u32, [u32; 2]) {
         let [column, row] = cell.map(|n| n / CHUNK_CELLS);
         (row * self.chunk_grid[0] + column, cell.map(|n| n % CHUNK_CELLS))
     }

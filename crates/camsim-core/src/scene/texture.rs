@@ -21,7 +21,7 @@ pub enum Encoding {
 
 impl Encoding {
     /// Linear light of each of the 256 byte values.
-    pub(crate) fn decode_table(self) -> [f32; 256] {
+    pub fn decode_table(self) -> [f32; 256] {
         std::array::from_fn(|byte| {
             let stored = byte as f32 / 255.0;
             match self {
@@ -145,12 +145,12 @@ impl Texture {
     }
 
     /// Alpha at texture coordinates, 0..=1: bilinear, or that of the nearest pixel.
-    pub(crate) fn alpha_at(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool) -> f64 {
+    pub fn alpha_at(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool) -> f64 {
         self.read_at(uv, wrap, nearest, |pixel| f64::from(pixel[3]) / 255.0)
     }
 
     /// What `value` makes of pixels, at texture coordinates: bilinear, or that of the nearest pixel.
-    pub(crate) fn read_at<T>(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool, value: impl Fn(&[u8]) -> T) -> T
+    pub fn read_at<T>(&self, uv: [f64; 2], wrap: [Wrap; 2], nearest: bool, value: impl Fn(&[u8]) -> T) -> T
     where
         T: Add<Output = T> + Mul<f64, Output = T>,
     {

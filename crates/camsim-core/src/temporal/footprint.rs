@@ -31,7 +31,7 @@ pub enum TapStage {
 
 /// Widths from which on a grid of bilinear reads covers a pixel, squared, ideal pixels: a single read has this variance (times 12), 1 of
 /// the ideal pixel and 2 of the tent.
-pub(crate) const TENT_PX2: f64 = 3.0;
+pub const TENT_PX2: f64 = 3.0;
 
 /// Widest area that is read, ideal pixels: six of them along each axis.
 pub const WIDEST_AREA_PX: f64 = 5.0;
@@ -96,7 +96,7 @@ impl Footprint {
     }
 
     /// Column and row of tap `i` (cyclic) in the grid.
-    pub(crate) fn cell(&self, i: u32) -> [u32; 2] {
+    pub fn cell(&self, i: u32) -> [u32; 2] {
         let [nx, ny] = self.taps;
         let place = place_of_turn(self.taps, i % (nx * ny));
         [place % nx, place / nx]
@@ -167,7 +167,7 @@ pub fn tap_shares(taps: [u32; 2]) -> Vec<[f32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{plan::PathStage, temporal::gather};
+    use crate::temporal::{PathStage, gather};
 
     #[test]
     fn reads_have_the_variance_of_the_pixel_that_they_stand_for() {

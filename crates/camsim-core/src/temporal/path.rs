@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 
-use crate::plan::PathStage;
+use super::PathStage;
 
 /// Most places on one polynomial.
 const MOST: usize = 5;

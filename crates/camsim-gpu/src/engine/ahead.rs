@@ -12,11 +12,11 @@ use std::{
 };
 
 use camsim_core::{
-    plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times},
     pose::CameraPose,
     scene::{GroundTiles, PlacedMesh, TerrainDetail},
     temporal::IdealGeometry,
 };
+use camsim_plan::{FramePlan, LinePoses, LineTimes, PlanError, Planner, SurfaceReads, TemporalStage, line_poses, line_times};
 
 use super::ms_since;
 use crate::ideal::base_ned_m;

@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use camsim_core::{
-    plan::{EdgeStage, SurfaceReads},
     pose::CameraPose,
     scene::{LevelTolerance, LodSelection},
     temporal::IdealGeometry,
 };
+use camsim_plan::{EdgeStage, SurfaceReads};
 
 use super::{MAX_FINE_TARGETS, MAX_TARGETS, RenderErrorBase, Session, ahead::Prepared, ms_since, slot::Target};
 use crate::{

@@ -1,6 +1,6 @@
 //! What can go wrong while frames are rendered.
 
-use camsim_core::plan::PlanError;
+use camsim_plan::PlanError;
 
 use crate::{context::GpuError, shaders::ComposeError};
 

@@ -1,9 +1,7 @@
 //! Depth and coordinates where a look-up in the ideal frame does not tell them: by rays in f64, cast by the host.
 
-use camsim_core::{
-    plan::{FramePlan, Planner, Sight},
-    temporal::suspects::{DepthGrid, changed},
-};
+use camsim_core::temporal::suspects::{DepthGrid, changed};
+use camsim_plan::{FramePlan, Planner, Sight};
 use glam::DVec2;
 use rayon::prelude::*;
 

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use camsim_core::{frame::RenderedFrame, plan::FramePlan, scene::LodSelection};
+use camsim_core::{frame::RenderedFrame, scene::LodSelection};
+use camsim_plan::FramePlan;
 
 use super::{
     InFlight, Session,

@@ -19,7 +19,7 @@ impl Session<'_> {
     /// Device faults; `None` before the first frame.
     pub fn read_ideal(&self) -> Result<Option<IdealImages>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
-        let near_m = camsim_core::plan::NEAR_M as f32;
+        let near_m = camsim_plan::NEAR_M as f32;
         let Some(target) = drawn.target.map(|target| &self.targets[target].ideal) else {
             let images = self.on_host.as_ref().zip(drawn.copy).map(|(on_host, copy)| on_host.drawn(copy).images(drawn.ideal.size_px));
             return Ok(images.map(|(color, depth)| (drawn.ideal, color, depth.iter().map(|d| d / near_m).collect())));
@@ -38,7 +38,7 @@ impl Session<'_> {
     }
 
     /// Triangles of the terrain near marks, which were drawn with several samples a pixel, in the frame that the ideal frame was last drawn
-    /// for (of several ideal frames the first). Only of use where [`camsim_core::plan::EdgeStage`] does not say `thin`: there all are drawn.
+    /// for (of several ideal frames the first). Only of use where [`camsim_plan::EdgeStage`] does not say `thin`: there all are drawn.
     ///
     /// # Errors
     /// Device faults; `None` before the first frame.

@@ -1,10 +1,7 @@
 //! Frames whose reverse pipeline runs on the host: what they read of the device, and what stays from frame to frame.
 
-use camsim_core::{
-    plan::{FramePlan, RayStage},
-    sequence::Sequence,
-    temporal::IdealGeometry,
-};
+use camsim_core::{sequence::Sequence, temporal::IdealGeometry};
+use camsim_plan::{FramePlan, RayStage};
 
 use super::readback::Rows;
 use crate::{

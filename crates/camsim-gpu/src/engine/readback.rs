@@ -9,9 +9,9 @@ use std::{
 use camsim_core::{
     frame::{COORDS_CHANNELS, sky_direction_ned},
     mount::CameraPath,
-    plan::FramePlan,
     pose::CameraPose,
 };
+use camsim_plan::FramePlan;
 use glam::DVec2;
 use rayon::prelude::*;
 

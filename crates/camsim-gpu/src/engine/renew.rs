@@ -6,10 +6,10 @@ use std::sync::Arc;
 use camsim_core::{
     noise::{SEGMENTS, tail_segments},
     photometric::vignette_weights,
-    plan::Planner,
     scenario::Channel,
     sequence::Sequence,
 };
+use camsim_plan::Planner;
 use wgpu::util::DeviceExt;
 
 use super::{Engine, FRAMES_IN_FLIGHT, RenderError, Session, slot::Slot};

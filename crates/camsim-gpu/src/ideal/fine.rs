@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use camsim_core::plan::EdgeStage;
+use camsim_plan::EdgeStage;
 
 use super::{
     COLOR_FORMAT, DEPTH_FORMAT, STORED_FORMAT, STORED_VIEW,

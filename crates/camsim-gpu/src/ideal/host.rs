@@ -9,10 +9,10 @@
 use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use camsim_core::{
-    plan::FramePlan,
     pose::CameraPose,
     scene::{LevelTolerance, Light, Material, PlacedMesh, Scene, Terrain, Texture, Wrap, is_whole},
 };
+use camsim_plan::FramePlan;
 use rayon::prelude::*;
 
 use super::{base_ned_m, ideal_camera, surfaces::see_meshes};

@@ -1,6 +1,6 @@
 //! Marks of silhouettes in an ideal frame, the borders of surfaces within marked pixels, and what lies within reach of each place.
 
-use camsim_core::plan::{FramePlan, SIZE_QUANTUM_PX};
+use camsim_plan::{FramePlan, SIZE_QUANTUM_PX};
 
 use super::{
     COLOR_FORMAT, IdealTarget,

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use camsim_core::plan::FramePlan;
+use camsim_plan::FramePlan;
 
 use super::{IdealSlot, fine::FineTarget, key_rows};
 use crate::{

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use camsim_core::plan::SurfaceReads;
+use camsim_plan::SurfaceReads;
 
 use super::{
     COLOR_FORMAT, FINE_SAMPLES, IdealPass,

@@ -6,12 +6,8 @@
 
 #![expect(clippy::needless_range_loop, reason = "numbers of one pixel have one place in all arrays")]
 
-use camsim_core::{
-    noise::tail_segments,
-    plan::{BlurStage, FramePlan, RayStage},
-    shutter::LinesAxis,
-    temporal::TapStage,
-};
+use camsim_core::{noise::tail_segments, shutter::LinesAxis, temporal::TapStage};
+use camsim_plan::{BlurStage, FramePlan, RayStage};
 use rayon::prelude::*;
 
 use crate::{

@@ -1,16 +1,13 @@
 //! What a kernel is composed of.
 
-use camsim_core::{
-    plan::{EdgeStage, FramePlan, NodeDepths, PathStage, RayStage, TemporalStage},
-    scenario::Preset,
-    temporal::TapStage,
-};
+use camsim_core::{scenario::Preset, temporal::TapStage};
+use camsim_plan::{EdgeStage, FramePlan, NodeDepths, PathStage, RayStage, TemporalStage};
 
 use crate::shaders::Slot;
 
 /// Temporal inverse without its numbers: numbers go into uniforms, never into a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "as camsim_core::plan::TemporalStage")]
+#[expect(missing_docs, reason = "as camsim_plan::TemporalStage")]
 pub enum TemporalKind {
     Identity,
     Rotation,
@@ -363,7 +360,7 @@ impl PipelineKey {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use camsim_core::plan::SurfaceReads;
+    use camsim_plan::SurfaceReads;
 
     use super::*;
     use crate::{

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use camsim_core::{
     frame::RenderedFrame,
-    plan::FramePlan,
     pose::CameraPose,
     scene::{Encoding, Mesh, MeshVertex, Scene, Texture, Wrap},
     sequence::Sequence,
@@ -16,6 +15,7 @@ use camsim_core::{
         marks::marks,
     },
 };
+use camsim_plan::FramePlan;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 

@@ -1,10 +1,10 @@
 //! Every key of a scenario file, with what it takes. A test holds this table against the structs. FRAME.toml has a table of its own.
 
 use camsim_core::{
-    plan::MAX_KEYS,
     scenario::{MAX_BLUR_SAMPLES, MAX_FOOTPRINT_TAPS, MAX_FRAMES_PER_IDEAL, MAX_ITERATIONS, MAX_SIDE_PX},
     temporal::SAMPLES,
 };
+use camsim_plan::MAX_KEYS;
 
 /// A table of keys with what belongs to it.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use camsim_core::{plan::FramePlan, pose::CameraPose};
+use camsim_core::pose::CameraPose;
+use camsim_plan::FramePlan;
 
 use super::{
     WriteError,

@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use camsim_core::{
     mount::{CameraPath, MountError},
-    plan::{FramePlan, Planner},
     scenario::{Auto, Channel, LensSpec, QualitySpec, ShutterSpec, Silhouettes},
     sequence::Sequence,
     temporal::TapStage,
 };
 use camsim_gpu::Engine;
+use camsim_plan::{FramePlan, Planner};
 use serde::Serialize;
 
 use super::{

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    plan::Planner,
     scenario::{Auto, Channel, LensModel, Preset, Scenario, Silhouettes, Solver},
     sequence::Sequence,
 };
+use camsim_plan::Planner;
 
 use crate::cases::{Case, Group};
 

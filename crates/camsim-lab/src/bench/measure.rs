@@ -3,11 +3,11 @@
 use std::{collections::HashMap, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, Planner, Predicted},
     scenario::{Channel, Preset},
     sequence::Sequence,
 };
 use camsim_gpu::{Engine, RenderError};
+use camsim_plan::{FramePlan, Planner, Predicted};
 
 use super::{
     BenchError, Row,

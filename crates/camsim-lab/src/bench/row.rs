@@ -1,6 +1,7 @@
 //! A point of the table.
 
-use camsim_core::{plan::FramePlan, reference::CoordErrors};
+use camsim_core::reference::CoordErrors;
+use camsim_plan::FramePlan;
 use serde::Serialize;
 
 use super::{knobs::Family, rounds::Times, truth::PictureErrors};

@@ -78,7 +78,7 @@ impl Truth {
             finished = Some(done);
             Ok(())
         })?;
-        Ok(finished.and_then(|Finished { frame, plan, .. }| self.coords.errors(&plan, &frame, STEP_PX)))
+        Ok(finished.and_then(|Finished { frame, plan, .. }| self.coords.errors(&plan.ideal_view(), &frame, STEP_PX)))
     }
 
     /// Compares a picture of the frame.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use camsim_core::{
-    reference::{ErrorStats, KeyFrame, coord_errors},
+    reference::{ErrorStats, IdealView, coord_errors},
     scenario::{CameraSpec, Channel, FieldOr, FlightSpec, Scenario, SceneSpec, ShutterSpec, TerrainSpec, TrackerSpec},
     sequence::Sequence,
 };
@@ -79,7 +79,7 @@ fn left_turn_over_land(sequence: &Sequence) -> Result<(f64, f64), ReproduceError
 /// of the pixels looked at have their source outside of it.
 fn paper_errors(setup: &Setup<'_>, sequence: &Arc<Sequence>, phase: f64) -> Result<(ErrorStats, usize), ReproduceError> {
     let ideal = Ideal::at(setup.engine, sequence, sequence.start_s)?;
-    let key = KeyFrame { pose: ideal.pose, ideal: ideal.geometry };
+    let key = IdealView { pose: ideal.pose, ideal: ideal.geometry };
     let oracle = rig::oracle(sequence)?;
     let view = oracle.view(0);
     let [width, height] = sequence.scenario.camera.size_px;
@@ -144,7 +144,8 @@ pub(super) fn run(setup: &Setup<'_>) -> Result<Report, ReproduceError> {
         let (paper, outside) = paper_errors(setup, &sequence, phase)?;
         let finished = rig::render_at_phase(setup.engine, &sequence, &[Channel::Coords], [0], phase as f32)?.pop();
         let finished = finished.ok_or_else(|| ReproduceError::made("the sequence", "it gave no frame"))?;
-        let own = coord_errors(&rig::oracle(&sequence)?, &finished.plan, &finished.frame, phase, STEP_PX).unwrap_or_default();
+        let own = coord_errors(&rig::oracle(&sequence)?, finished.plan.frame, &finished.plan.ideal_view(), &finished.frame, phase, STEP_PX)
+            .unwrap_or_default();
         frames.push(finished.frame);
         table.row([
             name.into(),

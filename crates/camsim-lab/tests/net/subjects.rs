@@ -4,7 +4,6 @@
 use std::{path::Path, sync::Arc};
 
 use camsim_core::{
-    plan::{FramePlan, PlanError, Planner},
     pose::BodyState,
     scenario::{Auto, Channel, FieldOr, Parity, Preset, Readout, Silhouettes, Solver},
     scenario::{CameraSpec, QualitySpec, ZoomSpec},
@@ -13,6 +12,7 @@ use camsim_core::{
 };
 use camsim_io::{load::load_sequence, scenario_file::read_scenario};
 use camsim_lab::{bench::knobs::resize, cases};
+use camsim_plan::{FramePlan, PlanError, Planner};
 use glam::{DQuat, DVec3};
 
 /// Changes a sequence after it has got its size.

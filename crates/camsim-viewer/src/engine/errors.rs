@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use camsim_core::plan::{ErrorMap, PlaceError};
+use camsim_plan::{ErrorMap, PlaceError};
 use eframe::egui::{Color32, ColorImage};
 
 use super::picture::{Picture, ramp};
@@ -76,7 +76,7 @@ fn tinted(image: &ColorImage, map: &ErrorMap) -> ColorImage {
 
 #[cfg(test)]
 mod tests {
-    use camsim_core::plan::ErrorPlace;
+    use camsim_plan::ErrorPlace;
 
     use super::*;
 

@@ -7,11 +7,12 @@ use std::{
     time::Instant,
 };
 
-use camsim_core::{mount::CameraPath, plan::PlanError, scenario::Channel, sequence::Sequence};
+use camsim_core::{mount::CameraPath, scenario::Channel, sequence::Sequence};
 use camsim_gpu::{
     AdapterChoice, Engine, GpuError, RenderError,
     engine::{Finished, Session},
 };
+use camsim_plan::PlanError;
 
 use super::{
     Speaker,

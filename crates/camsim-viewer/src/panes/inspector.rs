@@ -1,14 +1,8 @@
 //! The pixel under the cursor: its value, its instant, its ray, what it sees, and how sure that is.
 
-use camsim_core::{
-    camera::CameraModel,
-    geodesy::LocalFrame,
-    plan::FramePlan,
-    reference::{KeyFrame, Look},
-    scenario::SceneSpec,
-    temporal::samples_for,
-};
+use camsim_core::{camera::CameraModel, geodesy::LocalFrame, reference::Look, scenario::SceneSpec, temporal::samples_for};
 use camsim_io::write::srgb8;
+use camsim_plan::FramePlan;
 use eframe::egui::{self, Ui};
 use glam::DVec2;
 
@@ -176,7 +170,7 @@ fn moved(ui: &mut Ui, pixel: [u32; 2], path: Option<&motion::PixelPath>) {
 }
 
 fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
-    let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
+    let key = plan.ideal_view();
     let at = key.source_px(look);
     let [width, height] = plan.ideal.size_px.map(f64::from);
     let inside = at.x > -0.5 && at.y > -0.5 && at.x < width - 0.5 && at.y < height - 0.5;
@@ -192,7 +186,7 @@ fn source(ui: &mut Ui, plan: &FramePlan, look: &Look) {
 /// Samples that this pixel has for the length of its way through the ideal frame, stretch by stretch, as the kernel counts them. For taps it may have more.
 fn samples(ui: &mut Ui, plan: &FramePlan, look: impl Fn(f64) -> Option<Look>) {
     let Some(blur) = plan.blur else { return };
-    let key = KeyFrame { pose: plan.key_pose, ideal: plan.ideal };
+    let key = plan.ideal_view();
     let pieces = PIECES * blur.stretches();
     let at = |piece: u32| look(f64::from(piece) / f64::from(pieces) - 0.5).map(|look| key.source_px(&look));
     let Some(way) = (0..=pieces).map(at).collect::<Option<Vec<DVec2>>>() else { return };

@@ -1,6 +1,6 @@
 //! The frame's plan: passes with their times, what is left out and why, and how far off the pixels will be.
 
-use camsim_core::plan::Predicted;
+use camsim_plan::Predicted;
 use eframe::egui::{self, RichText, Ui};
 
 use super::widgets::{fact, facts};

@@ -37,7 +37,7 @@ impl Aabb {
     }
 
     /// Smallest box around this one, turned and scaled about (0, 0, 0) and then moved.
-    pub(crate) fn turned(&self, turn: DMat3, shift: DVec3) -> Self {
+    pub fn turned(&self, turn: DMat3, shift: DVec3) -> Self {
         if self.is_empty() {
             return *self;
         }

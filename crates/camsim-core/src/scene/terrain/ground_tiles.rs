@@ -8,12 +8,10 @@ use glam::{DMat2, DVec2};
 use rayon::prelude::*;
 
 use super::{CHUNK_CELLS, Terrain, TerrainDetail, lattice::NODE_CELLS};
-use crate::{
-    plan::SurfaceReads,
-    scene::{
-        picture_tiles::{TileGrid, tile_bytes},
-        texture::TexelForm,
-    },
+use crate::scene::{
+    SurfaceReads,
+    picture_tiles::{TileGrid, tile_bytes},
+    texture::TexelForm,
 };
 
 /// A triangle over several cells is at most this much steeper than the steepest cell below it: it follows from the cells' slopes along two
@@ -219,10 +217,7 @@ mod tests {
         super::tests::{Random, forward, hill_heights, nadir},
         *,
     };
-    use crate::{
-        plan::surface_filter::SurfaceFilter,
-        scene::{Encoding, Texture},
-    };
+    use crate::scene::{Encoding, SurfaceFilter, Texture};
 
     #[test]
     fn whatever_a_pixel_reads_is_among_the_tiles() {

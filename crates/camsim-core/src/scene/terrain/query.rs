@@ -155,7 +155,7 @@ fn passes(corners: [DVec2; 4]) -> bool {
 /// Signed volumes over the edges, seen from the ray's origin: swapping the ends of an edge exactly negates its volume in floating point,
 /// so two triangles agree on which side of their common edge a ray passes. Where several edges meet, rounding could still open a gap:
 /// triangles are larger by the rounding error of the volumes (1e-8 m for a cell of 10 m seen from 5 km).
-pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
+pub fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: DVec3, t_max: f64) -> Option<(f64, [f64; 3])> {
     /// 18 products and sums at most, of eps / 2 each, and some reserve.
     const ROUNDING: f64 = 4e-15;
     let (a, b, c) = (points[0] - origin, points[1] - origin, points[2] - origin);
@@ -175,7 +175,7 @@ pub(crate) fn intersect_triangle(points: [DVec3; 3], origin: DVec3, direction: D
 
 /// Half-spaces that a camera sees.
 #[derive(Debug)]
-pub(crate) struct Frustum {
+pub struct Frustum {
     position_ned_m: DVec3,
     /// Inward normals, NED.
     normals: [DVec3; 5],

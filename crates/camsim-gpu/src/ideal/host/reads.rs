@@ -1,6 +1,6 @@
 //! Reads of a surface's picture, as many as the plan says: twin of shaders/ideal/surface.wgsl and shaders/ideal/reads.
 
-use camsim_core::plan::SurfaceReads;
+use camsim_plan::SurfaceReads;
 
 use super::picture::{NO_SUMS, Sums, Texels, colors as sums_of};
 use crate::host::{

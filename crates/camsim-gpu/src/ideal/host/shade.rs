@@ -2,7 +2,7 @@
 
 use std::{ops::Range, sync::Arc};
 
-use camsim_core::plan::SurfaceReads;
+use camsim_plan::SurfaceReads;
 
 use super::{
     corners::Camera,

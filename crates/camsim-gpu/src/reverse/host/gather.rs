@@ -1,6 +1,6 @@
 //! What a pixel collects over its exposure: twin of shaders/reverse/gather.
 
-use camsim_core::plan::PathStage;
+use camsim_plan::PathStage;
 
 use super::{
     Reads,

@@ -3,7 +3,7 @@
 use super::Reads;
 use crate::host::lanes::{LANES, Lanes, Lanes2, Lanes3, ZERO, each, whether};
 use crate::reverse::TemporalKind;
-use camsim_core::plan::NodeDepths;
+use camsim_plan::NodeDepths;
 
 /// Rows of R, with t in w: x_key = R x_line + t.
 pub(super) type Pose = [[f32; 4]; 3];

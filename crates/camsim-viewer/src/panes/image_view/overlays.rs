@@ -1,6 +1,7 @@
 //! What is drawn over a picture.
 
-use camsim_core::{camera::CameraModel, plan::ErrorMap};
+use camsim_core::camera::CameraModel;
+use camsim_plan::ErrorMap;
 use eframe::egui::{self, Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 use glam::DVec2;
 

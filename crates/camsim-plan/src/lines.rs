@@ -1,0 +1,119 @@
+//! Poses of every line of the readout, relative to the key pose, in f64 and then f32.
+
+use glam::{DMat3, DVec3};
+
+use super::{FramePlan, table_shape};
+use camsim_core::{frame::RowRecord, mount::CameraPath, pose::CameraPose, shutter::LinesAxis};
+
+/// Relative poses `x_key = R x_line + t` of a frame: `[key][field][line][node]`, each three rows of `(R, t)`; with more than one node
+/// the mid-exposure pose follows the nodes. Of frames whose ideal frames are not the mid-window camera's the poses `x_mid = R x_key + t` of the
+/// keys in that camera follow, and of frames with several keys then an entry for each field and line with the line's mid-exposure as a share of
+/// the window in its first number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinePoses {
+    /// Rows of `(R | t)`.
+    pub entries: Vec<[[f32; 4]; 3]>,
+    /// Entries a line.
+    pub stride: u32,
+}
+
+/// Times of a frame's lines after its key instant, seconds, ordered as the poses of [`LinePoses`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineTimes {
+    /// Seconds.
+    pub dt_s: Vec<f32>,
+    /// Entries a line.
+    pub stride: u32,
+}
+
+/// The pose table of a frame.
+#[must_use]
+pub fn line_poses(plan: &FramePlan, path: &CameraPath) -> LinePoses {
+    let relative = |pose: &CameraPose, to: &CameraPose| {
+        let (rotation, shift) = pose.relative_to(to);
+        rows_of(rotation, shift)
+    };
+    let mut entries = Vec::new();
+    let mut stride = 1;
+    for key in &plan.keys {
+        let (of_key, stride_of_key) = of_instants(plan, |t_s| relative(&path.pose(t_s), &key.pose));
+        entries.extend(of_key);
+        stride = stride_of_key;
+    }
+    if plan.keys.len() > 1 || plan.looks_from_elsewhere() {
+        entries.extend(plan.keys.iter().map(|key| relative(&key.pose, &plan.key_pose)));
+    }
+    if plan.keys.len() > 1 {
+        entries.extend(lines_of(plan).map(|(field, line)| {
+            let share = plan.window_share(plan.stamp_s + line_dt_s(plan, field, line));
+            [[share as f32, 0.0, 0.0, 0.0], [0.0; 4], [0.0; 4]]
+        }));
+    }
+    LinePoses { entries, stride }
+}
+
+/// The time table of a frame, for the solvers that take the motion as constant. Differences are taken in f64.
+#[must_use]
+pub fn line_times(plan: &FramePlan) -> LineTimes {
+    let (dt_s, stride) = of_instants(plan, |t_s| (t_s - plan.key_s) as f32);
+    LineTimes { dt_s, stride }
+}
+
+/// Fields and their lines, in the order of the tables.
+fn lines_of(plan: &FramePlan) -> impl Iterator<Item = (u32, u32)> {
+    let (_, lines, fields) = table_shape(&plan.shutter);
+    (0..fields).flat_map(move |field| (0..lines).map(move |line| (field, line)))
+}
+
+/// An entry for every `[field][line][node]` and the entries a line.
+fn of_instants<T>(plan: &FramePlan, entry: impl Fn(f64) -> T) -> (Vec<T>, u32) {
+    let (_, lines, fields) = table_shape(&plan.shutter);
+    let nodes = plan.blur.map_or(1, |blur| blur.nodes);
+    let stride = if nodes == 1 { 1 } else { nodes + 1 };
+    let mut entries = Vec::with_capacity((fields * lines * stride) as usize);
+    for (field, line) in lines_of(plan) {
+        let mid_s = plan.stamp_s + line_dt_s(plan, field, line);
+        if nodes > 1 {
+            entries.extend((0..nodes).map(|node| {
+                let along = f64::from(node) / f64::from(nodes - 1) - 0.5;
+                entry(mid_s + plan.shutter.exposure_s() * along)
+            }));
+        }
+        entries.push(entry(mid_s));
+    }
+    (entries, stride)
+}
+
+/// Time shift of a line of a field: with sideways readout the fields are the even and the odd rows.
+fn line_dt_s(plan: &FramePlan, field: u32, line: u32) -> f64 {
+    match plan.shutter.lines_axis() {
+        LinesAxis::Rows => plan.shutter.dt_line_s(line),
+        LinesAxis::Columns => plan.shutter.dt_pixel_s(line, field),
+    }
+}
+
+fn rows_of(rotation: DMat3, shift: DVec3) -> [[f32; 4]; 3] {
+    std::array::from_fn(|i| {
+        let row = rotation.row(i);
+        [row.x as f32, row.y as f32, row.z as f32, shift[i] as f32]
+    })
+}
+
+/// Time, pose and velocity of every line at its mid-exposure. With sideways readout and interlacing the records are those of the field
+/// that keeps the exact time.
+#[must_use]
+pub fn row_records(plan: &FramePlan, path: &CameraPath, epoch_ns: i64) -> Vec<RowRecord> {
+    (0..plan.shutter.lines())
+        .map(|row| {
+            let t_s = plan.stamp_s + plan.shutter.dt_line_s(row);
+            let pose = path.pose(t_s);
+            RowRecord {
+                row,
+                t_mid_ns: epoch_ns.saturating_add((t_s * 1e9).round() as i64),
+                position_ned_m: pose.position_ned_m,
+                ned_from_camera: pose.ned_from_camera,
+                velocity_ned_m_s: path.velocity_ned(t_s),
+            }
+        })
+        .collect()
+}
